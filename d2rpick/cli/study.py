@@ -26,7 +26,7 @@ from d2rpick.cli.options import RESULT, WINDOW
 from d2rpick.cli.output import Output, tell
 from d2rpick.cli.progress import show_counting
 from d2rpick.cli.values import choose_click_type
-from d2rpick.report.formats import FORMATS
+from d2rpick.report.formats import FORMATS, RepeatedQuestion
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -220,7 +220,7 @@ def _check_ledger(name: str | None, written: Mapping[str, str | None]) -> None:
 
 
 def _count_known(ledger: Ledger | None, sources: Sequence[str], *, quiet: bool) -> int:
-    """Print and return the number of runs whose rows are taken from an earlier study."""
+    """Print and return the number of runs whose rows come from an earlier study."""
     if ledger is None:
         return 0
     known_count = ledger.taking(sources)
@@ -268,4 +268,4 @@ def calibrate(folders: tuple[str, ...], output: Output) -> None:
     output = output.beside()
     answer = fit(folders)
     output.notes((), answer.cautions)
-    output.answer(answer)
+    output.answer(answer, question=RepeatedQuestion(files=folders))

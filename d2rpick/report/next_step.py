@@ -1,9 +1,10 @@
-"""Name the command that follows an answer, with the options and the files of its question, ready to be copied."""
+"""Name the command that follows an answer, with the options and files of its question, ready to be copied."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
+from d2rpick.choice.pair.grades import DO_NOT_USE
 from d2rpick.report.tables import make_positional, quote_shell_line
 
 if TYPE_CHECKING:
@@ -13,16 +14,17 @@ if TYPE_CHECKING:
     from d2rpick.choice.pair.decision import Decision
     from d2rpick.choice.pair.situation import Situation
     from d2rpick.choice.question import Settings
+    from d2rpick.deck.printed_card import PrintedCard
     from d2rpick.histories.history import History
     from d2rpick.report.formats import RepeatedQuestion
 
 # Placeholder ids in a command if the user has to name the parts or the nodes, because no file contains them.
 _SOME_PART: Final = "1"
 _SOME_NODE: Final = "1001"
-# Main deck in a command if the user has to name it, and the folder for the copy of it.
+# Placeholders for the main deck in a command if the user has to name it, and for the folder of its copy.
 _SOME_DECK: Final = "DECK"
 _FOLDER: Final = "switched"
-# Why the card of several parts needs the main deck.
+# Reason why the card of several parts needs the main deck.
 _NEEDS_DECK: Final = (
     f" (main deck of the run instead of {_SOME_DECK}; "
     "without it, parts that share nodes become separate rigid bodies)"
@@ -113,6 +115,26 @@ def name_step_to_card(
     return f"print the cards with {line}{hint}"
 
 
+def name_step_with_pair(
+    situation: Situation,
+    pair: tuple[float, float],
+    better: Pair | None,
+    question: RepeatedQuestion,
+    command: str,
+) -> str:
+    """Return the step with a pair that can be used: to the ``better`` pair or, without one, to the card of the pair."""
+    if better is not None:
+        return name_step_to_better_pair(better, question)
+    return name_step_to_card(
+        situation.history,
+        situation.settings,
+        [pair],
+        question,
+        command,
+        flying=situation.flight.by_parts,
+    )
+
+
 def name_step_to_better_pair(better: Pair, question: RepeatedQuestion) -> str:
     """Return the step that judges a better pair."""
     line = write_command(question, "suggest", "--td", f"{better.td:.6g}")
@@ -120,7 +142,7 @@ def name_step_to_better_pair(better: Pair, question: RepeatedQuestion) -> str:
 
 
 def _keep_td(times: Sequence[str]) -> Sequence[str]:
-    """Return the words of ``--td`` or ``--td-window`` among those of the times; empty without either."""
+    """Return the words of ``--td`` or ``--td-window`` among those of the times; empty if neither occurs."""
     for name, values in (("--td", 1), ("--td-window", 2)):
         if name in times:
             position = times.index(name)
@@ -155,3 +177,36 @@ def name_step_after_refusal(
         )
         return f"judge the parts that vibrate together with {line}"
     return otherwise
+
+
+def name_step_after_card(
+    card: PrintedCard,
+    worst: Decision | None,
+    question: RepeatedQuestion,
+    deck: str | None,
+) -> str:
+    """Return the step after a card: the check of the ``deck`` with it, or other times if the ``worst`` pair is poor."""
+    if worst is not None and worst.verdict == DO_NOT_USE:
+        return f"choose other times with {write_command(question, 'suggest')}"
+    if card.has_engine_files:
+        action, name = "put these files next to the starter deck", "starter deck"
+    else:
+        action, name = "add these cards to the main deck", "main deck"
+    hint = "" if deck else f" ({name} instead of {_SOME_DECK})"
+    files = make_positional([deck or _SOME_DECK])
+    line = quote_shell_line(("d2rpick", "check", *question.checking, *files))
+    return f"{action}, then check it with {line}{hint}"
+
+
+def name_step_after_extract(file: str) -> str:
+    """Return the step after the extraction of an energy into a file."""
+    line = quote_shell_line(("d2rpick", "suggest", *make_positional([file])))
+    return f"choose times with {line}"
+
+
+def name_step_after_first(folder: str) -> str:
+    """Return the step after a deck that switches itself was written into a folder."""
+    files = make_positional([folder])
+    check = quote_shell_line(("d2rpick", "check", *files))
+    follow = quote_shell_line(("d2rpick", "follow", *files))
+    return f"check the deck with {check}, and run it; {follow} shows meanwhile when the parts fly and are rigid"

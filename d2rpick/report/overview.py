@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import list_names, make_printable
-from d2rpick.choice.pair.grades import DO_NOT_USE
+from d2rpick.choice.pair.grades import DO_NOT_USE, USE, USE_WITH_CARE
 from d2rpick.flight import SOURCES
 from d2rpick.report import keys, tables
 from d2rpick.report.fields import Document, Field, get_kind, many, maybe, one_of, row
@@ -79,16 +79,22 @@ DOCUMENT: Final = Document("d2rpick/info/1", "Answer of d2rpick info; times in t
     Field("parts", many(_PART)),
     Field("flights", many(_FLIGHT), "free flights, found from the best evidence in the files"),
     Field("should_write", "text?",
-          "output to request so that the flights are certain; null if the files contain it"),
+          "output to request so that the flights of single parts are known; null if the files contain it"),
     keys.HEALTH,
     Field("notes", "texts"),
     Field("verdict", keys.VERDICT, "whether this run is suitable for choosing switch times", later=True),
     Field("verdict_reason", "text", "reason for the verdict, as text", lambda overview: overview.reason, later=True),
     Field("contact_forces", many(_FORCE), "contacts and rigid walls whose forces are in the files", later=True),
 ))  # fmt: skip
-# Largest number of contact times that are listed for a contact that acts often.
+# Largest number of contact times that are listed if a contact acts often.
 _MOST_TIMES: Final = 4
 _PARTS_HEAD = ("part", "title", "highest internal energy")
+# What to do with the record; the verdict of a pair has the same words, so the sentence names the record.
+_RECORD: Final = {
+    USE: "use it to choose times",
+    USE_WITH_CARE: "use it with care to choose times",
+    DO_NOT_USE: "do not use it to choose times",
+}
 # Keys of the JSON output whose value is neither a list nor an object.
 _PLAIN = (
     "format",
@@ -103,7 +109,7 @@ _PLAIN = (
 
 
 def as_table(overview: Overview, display: DisplayOptions) -> str:
-    """Return as text whether the run can be used, why, and the next command; then one line per fact, and the parts."""
+    """Return, as text, whether the run can be used, why, and the next command; then a line per fact, and the parts."""
     lines = tables.format_in_line(list_overview_lines(overview))
     if overview.health and (health := _list_health_rows(overview)):
         lines += [
@@ -126,7 +132,7 @@ def as_table(overview: Overview, display: DisplayOptions) -> str:
 
 def list_overview_lines(overview: Overview) -> list[tuple[str, str]]:
     """Return whether the run can be used, why, its flights, and the next command, as (name, sentence) pairs."""
-    lines = [("verdict", overview.verdict), ("why", overview.reason)]
+    lines = [("record", _RECORD[overview.verdict]), ("why", overview.reason)]
     lines += [("flight", _format_flight(*flight)) for flight in overview.flights]
     if overview.verdict == DO_NOT_USE:
         is_known = overview.unjudged or overview.rigid
@@ -186,7 +192,7 @@ def as_markdown(overview: Overview, _: DisplayOptions) -> str:
 
 
 def as_csv(overview: Overview, _: DisplayOptions) -> str:
-    """Return one row of CSV with a column for each key of the JSON output; semicolons separate the items of a list."""
+    """Return one row of CSV with a column per key of the JSON output; semicolons separate the items of a list."""
     sampling = overview.sampling
     row: dict[str, tables.Cell] = {
         "source": "; ".join(overview.source),
@@ -241,7 +247,7 @@ def list_facts(overview: Overview) -> list[tuple[str, tables.Cell]]:
 
 
 def _list_health_rows(overview: Overview) -> list[list[tables.Cell]]:
-    """Return the health quantities for which the files have data, each with its limit according to good practice."""
+    """Return the health quantities for which the files have data, each with the limit of good practice."""
     if overview.health is None:
         return []
     verdicts = {True: "within limit", False: "exceeded", None: None}

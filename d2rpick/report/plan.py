@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from d2rpick.report.formats import DisplayOptions, RepeatedQuestion, WrittenDeck
 
 
-# The run in which the parts can be switched in a window, keyed by status of the window.
+# Run in which the parts can be switched in a window, by status of the window.
 _RUN: Final = {
     "supported": "next run",
     "re-plan": "later run",
@@ -69,7 +69,7 @@ def _get_situation(row: PlannedFlight) -> Situation | None:
 
 
 def _make_margin_getter(key: str) -> Callable[[PlannedFlight], Any]:
-    """Return a function that reads a value of a window's margin; its result is None if the window is already used."""
+    """Return a function that reads a value from the margin of a window; None if the window has been used."""
     return lambda row: None if row.done else getattr(row.margin, key)
 
 
@@ -208,9 +208,10 @@ DOCUMENT: Final = Document(
 
 
 def as_table(plan: RunPlan, display: DisplayOptions) -> str:
-    """Return the plan in one sentence, the next command, one row per flight, and reasons with improvements."""
+    """Return the plan in one sentence, the next command, a row per flight, and reasons with improvements."""
     if plan.flights:
-        rows = tables.as_text(*build_flight_table(plan), display.width, _SPARE)
+        known_columns = tables.select_known_columns(*build_flight_table(plan))
+        rows = tables.as_text(*known_columns, display.width, _SPARE)
     else:
         rows = "no flight"
     below = [*list_verdicts(plan), *list_plan_remarks(plan), *list_reasons(plan)]
@@ -320,7 +321,11 @@ def list_next_steps(
     elif needs_deck(plan.history, plan.settings):
         step = name_step_to_deck(question)
     if written_deck:
-        step = f"run the deck in {written_deck.folder} from t = 0"
+        folder = written_deck.folder
+        compare = write_command(question, "verify", "--switched", folder)
+        step = (
+            f"run the deck in {folder} from t = 0, and compare the run with {compare}"
+        )
         if not written_deck.passed:
             step = f"correct what the check of the written deck found, then {step}"
         elif written_deck.warned:
@@ -337,7 +342,10 @@ def _list_step_without_window(
     """Return the next command of a plan without a window that can be used now."""
     rows = [row for row in plan.flights if row.answer and not row.done]
     if not rows:
-        return []
+        if plan.done or not plan.flights:
+            return []
+        line = write_command(question, "explore")
+        return [("next", f"compare all td of the longest flight with {line}")]
     answer = max(rows, key=lambda row: row.end - row.start).answer
     assert answer is not None
     better = answer.decision.better if answer.decision else None
@@ -358,7 +366,7 @@ def list_verdicts(plan: RunPlan) -> list[tuple[str, str]]:
 
 
 def as_markdown(plan: RunPlan, display: DisplayOptions) -> str:
-    """Return the flights as a Markdown table, with the saving and the reasons against windows below."""
+    """Return the flights as a Markdown table and, below it, the saving and the reasons against windows."""
     below = tables.format_as_list(
         (
             *list_next_steps(plan, display.question, display.written_deck),
@@ -397,7 +405,7 @@ def as_value(plan: RunPlan, display: DisplayOptions) -> str:
 
 
 def list_plan_remarks(plan: RunPlan) -> list[tuple[str, str]]:
-    """Return the rigid time sacrificed for quality, and the position errors, as (name, sentence) pairs."""
+    """Return the rigid time given up for quality, and the position errors, as (name, sentence) pairs."""
     supported = plan.supported
     lines = []
     lines += [
@@ -436,7 +444,7 @@ def _list_position_errors(plan: RunPlan) -> list[tuple[str, str]]:
 
 
 def build_flight_table(plan: RunPlan) -> tuple[list[str], list[list[tables.Cell]]]:
-    """Return the column names and cells of all flights; CPU time and position error only if they are known."""
+    """Return the column names and cells of all flights; CPU time and position error appear only if they are known."""
     placed = any(
         row.candidate and row.candidate.position_error is not None
         for row in plan.flights

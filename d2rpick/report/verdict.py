@@ -18,8 +18,7 @@ from d2rpick.report.decision import (
 from d2rpick.report.fields import Document, Field, get_kind, maybe, row
 from d2rpick.report.next_step import (
     name_step_after_refusal,
-    name_step_to_better_pair,
-    name_step_to_card,
+    name_step_with_pair,
     write_command,
 )
 from d2rpick.report.situation import list_situation_heading
@@ -27,9 +26,9 @@ from d2rpick.report.situation import list_situation_heading
 if TYPE_CHECKING:
     from d2rpick.choice.answers import PairVerdict
     from d2rpick.choice.switched.comparison import Comparison
-    from d2rpick.report.formats import DisplayOptions, RepeatedQuestion
+    from d2rpick.report.formats import DisplayOptions
 
-# Fields of the judged pair, of its measured values, and of the verdict.
+# Fields of the judged pair, of its measured values, and of the verdict on it.
 MEASURES: Final = row(
     Field("tr", "number", get=lambda answer: answer.candidate.tr),
     Field("td", "number", get=lambda answer: answer.situation.td),
@@ -76,13 +75,13 @@ COMPARED = ("", "switched", "reference")
 
 
 def as_table(answer: PairVerdict, display: DisplayOptions) -> str:
-    """Return as text the verdict with reasons and improvements, its evidence, and the measured values of the pair."""
+    """Return, as text, the verdict with reasons and improvements, its evidence, and the measured values of the pair."""
     decided = answer.decision.reason
     remarks = [("note", reason) for reason in answer.reasons if reason not in decided]
     above = list_situation_heading(answer.situation, verbose=display.verbose)
     verdict_lines = [
         *list_pair_verdict(answer),
-        *list_next_step(answer, display.question),
+        *list_next_step(answer, display),
     ]
     if answer.switched:
         verdict_lines = [list_comparison_verdict(answer.switched), *verdict_lines]
@@ -108,9 +107,10 @@ def list_pair_verdict(answer: PairVerdict) -> list[tuple[str, str]]:
 
 
 def list_next_step(
-    answer: PairVerdict, question: RepeatedQuestion
+    answer: PairVerdict, display: DisplayOptions
 ) -> list[tuple[str, str]]:
     """Return the next command: it leads to the card of a usable pair, a page on its switched run, or a better pair."""
+    question = display.question
     decision = answer.decision
     situation = answer.situation
     if decision.verdict == DO_NOT_USE:
@@ -122,21 +122,15 @@ def list_next_step(
             f"compare other td with {line}",
             decision,
         )
+    elif answer.switched and display.page:
+        step = f"use the results of the switched run; {display.page} contains the comparison"
     elif answer.switched:
         words = (*question.times, "--report", "verify.html")
         line = write_command(question, "verify", *words)
         step = f"use the results of the switched run; keep the comparison with {line}"
-    elif decision.better is not None:
-        step = name_step_to_better_pair(decision.better, question)
     else:
-        step = name_step_to_card(
-            situation.history,
-            situation.settings,
-            [(answer.candidate.tr, answer.td)],
-            question,
-            "card",
-            flying=situation.flight.by_parts,
-        )
+        pair = (answer.candidate.tr, answer.td)
+        step = name_step_with_pair(situation, pair, decision.better, question, "card")
     return [("next", step)]
 
 
@@ -145,9 +139,9 @@ def list_comparison_verdict(switched: Comparison) -> tuple[str, str]:
     compared = []
     if switched.mean_after_reference > 0:
         ratio = switched.mean_after / switched.mean_after_reference
-        limits = f"{switched.min_mean:g} to {2 - switched.min_mean:g}"
+        limits = f"{100 * switched.min_mean:g}% to {100 * (2 - switched.min_mean):g}%"
         compared.append(
-            f"mean energy after td {ratio:.2f} times that of the reference run (limits {limits})"
+            f"mean energy after td {ratio:.0%} of the reference run (limits {limits})"
         )
     if switched.momentum_error is not None:
         limit = f"limit {MOST_MOMENTUM_ERROR:.0%}"
@@ -176,9 +170,9 @@ def list_known_measures(answer: PairVerdict) -> list[tuple[str, tables.Cell]]:
     unit = answer.situation.history.energy_unit
     unit_text = f" [{make_printable(unit)}]" if unit else ""
     rows: list[tuple[str, tables.Cell]] = [
-        (f"energy at tr{unit_text}", best.energy),
-        (f"energy at td{unit_text}", answer.energy_td),
-        ("energy at tr / at td", best.level_ratio),
+        (f"E(tr), energy at tr{unit_text}", best.energy),
+        (f"E(td), energy at td{unit_text}", answer.energy_td),
+        ("E(tr)/E(td)", best.level_ratio),
         ("level error", tables.format_if_known(best.level_error, ".3f")),
         ("direction of the deformation at tr", direction),
         ("kinetic fraction at td", tables.format_if_known(answer.kinetic_share, ".3f")),
@@ -200,7 +194,7 @@ def as_markdown(answer: PairVerdict, display: DisplayOptions) -> str:
         (
             *comparison_lines,
             *list_pair_verdict(answer),
-            *list_next_step(answer, display.question),
+            *list_next_step(answer, display),
             *list_pair_evidence(answer),
         )
     )
@@ -217,7 +211,7 @@ def as_markdown(answer: PairVerdict, display: DisplayOptions) -> str:
 
 
 def list_all_measures(answer: PairVerdict) -> dict[str, Any]:
-    """Return the values of the pair, keyed by name; those of a switched run have the prefix ``switched_``."""
+    """Return the values of the pair by name; those of a switched run have the prefix ``switched_``."""
     situation = answer.situation
     measured: dict[str, Any] = {
         "energy_td": situation.energy_td,
@@ -279,7 +273,7 @@ def _format_comparison(switched: Comparison) -> list[str]:
 
 
 def _list_switched_measures(answer: PairVerdict) -> dict[str, Any]:
-    """Return the values of the switched run, keyed by name; empty if there is no switched run."""
+    """Return the values of the switched run by name; empty if there is no switched run."""
     values = SWITCHED.plain(answer.switched) if answer.switched else {}
     values = {
         name: "; ".join(value) if name == "objections" else value

@@ -57,7 +57,7 @@ _LEAST_TURNS, _SURE_TURNS, _MOST_DAMPED, _MOST_DECAY = 0.25, 1.0, 0.35, 40.0
 # Largest exponent by which noise may make a vibration seem to grow over the record [-].
 MOST_GROWTH: Final = 0.2
 # _MOST_DECAYS: largest number of decaying exponentials that the mean contains in addition to a constant.
-# _SAME_DECAY: smallest difference between the exponents by which two exponentials decay over the record [-].
+# _SAME_DECAY: two exponentials are distinguished if their decays over the record differ by at least this exponent [-].
 _MOST_DECAYS, _SAME_DECAY = 4, 0.05
 
 
@@ -84,9 +84,9 @@ class Grid(NamedTuple):
         """Return the time from the first block to the last block [time]."""
         return float(self.time[-1] - self.time[0])
 
-    def first(self, count: int) -> Grid:
-        """Return a grid with the first ``count`` blocks."""
-        return self._replace(time=self.time[:count], energy=self.energy[:count])
+    def some(self, blocks: slice) -> Grid:
+        """Return a grid with some successive blocks."""
+        return self._replace(time=self.time[blocks], energy=self.energy[blocks])
 
     def waves(self, poles: Complex) -> Complex:
         """Return exp(p (t - t_0)) at the m times t of the grid, where t_0 is the first time; shape (m, poles) [-].
@@ -207,7 +207,7 @@ class Spectrum(NamedTuple):
 
     @property
     def error(self) -> float:
-        """Return the rms misfit [energy]."""
+        """Return the rms misfit of the spectrum [energy]."""
         return float(np.sqrt(np.mean(self.rest**2)))
 
     def turned(self) -> Spectrum:
@@ -281,8 +281,9 @@ def predict(grid: Grid) -> Prediction | None:
     )
     if not swing > 0:
         return None
-    first = grid.first(int(FIRST_PART * grid.time.size))
-    rest_of_grid = slice(first.time.size, None)
+    size_of_first = int(FIRST_PART * grid.time.size)
+    first = grid.some(slice(size_of_first))
+    rest = grid.some(slice(size_of_first, None))
     space = _SignalSpace.of(first)
     tried: list[tuple[float, int, bool, Spectrum]] = []
     for order in _ORDERS:
@@ -291,10 +292,8 @@ def predict(grid: Grid) -> Prediction | None:
         poles = space.poles(order)
         for every_decay in (False, True):
             spectrum = fit_spectrum(first, poles, grid.span, every_decay=every_decay)
-            predicted = spectrum.average_blocks(grid).at(grid.time[rest_of_grid])
-            error = float(
-                np.sqrt(np.mean((predicted - grid.energy[rest_of_grid]) ** 2))
-            )
+            predicted = _average_blocks(spectrum, rest)
+            error = float(np.sqrt(np.mean((predicted - rest.energy) ** 2)))
             missed = float(np.hypot(error, spectrum.error)) / swing
             if not tried or missed < _get_needed(tried[-1][3]) * tried[-1][0]:
                 tried.append((missed, order, every_decay, spectrum))
@@ -309,14 +308,14 @@ def predict(grid: Grid) -> Prediction | None:
 
 
 def _get_needed(spectrum: Spectrum) -> float:
-    """Return the factor by which more exponentials must reduce the prediction error of a spectrum [-]."""
+    """Return the factor by which additional exponentials must reduce the prediction error of a spectrum [-]."""
     powers = np.abs(np.fft.rfft(spectrum.rest)) ** 2
     typical = float(np.mean(powers))
     return _BETTER if powers.max() > _OF_A_LINE * typical else _CLEARLY_BETTER
 
 
 class _SignalSpace:
-    """The signal subspace, spanned by the windows of a record, with its directions in descending order of size."""
+    """The signal subspace spanned by the windows of a record; its directions are in descending order of size."""
 
     def __init__(self, vectors: Samples, step: float) -> None:
         self.vectors, self.step = vectors, step
@@ -325,7 +324,10 @@ class _SignalSpace:
     def of(cls, grid: Grid) -> _SignalSpace:
         """Compute the signal subspace of a grid."""
         lags = min(grid.time.size // 2, _MOST_LAGS)
-        windows = np.lib.stride_tricks.sliding_window_view(grid.energy, lags)
+        # A copy, which is multiplied by itself in half the time of overlapping views.
+        windows = np.ascontiguousarray(
+            np.lib.stride_tricks.sliding_window_view(grid.energy, lags)
+        )
         return cls(np.linalg.eigh(windows.T @ windows)[1][:, ::-1], grid.step)
 
     @property
@@ -346,7 +348,9 @@ class _SignalSpace:
 def fit_spectrum(
     grid: Grid, poles: Complex, span: float, *, every_decay: bool = False
 ) -> Spectrum:
-    """Fit lines and mean with the given poles to a grid; poles must differ within ``span`` [time].
+    """Fit lines and a mean with the given poles to a grid.
+
+    Decays that cannot be distinguished within ``span`` are merged.
 
     If ``every_decay`` is True, the mean contains the decay of each line, which noise permits only for few lines.
     """
@@ -370,6 +374,17 @@ def fit_weights(grid: Grid, lines: Complex, mean: Complex) -> Spectrum:
         Exponentials(mean, weights[count:], origin),
         remainder,
     )
+
+
+def _average_blocks(spectrum: Spectrum, grid: Grid) -> Samples:
+    """Return the means of a spectrum over the blocks of a grid, shape (m,) [energy]."""
+    parts = (spectrum.lines, spectrum.mean)
+    poles = np.concatenate([part.poles for part in parts])
+    weights_at_start = np.concatenate(
+        [part.weights * part.waves(grid.time[0]) for part in parts]
+    )
+    means = grid.waves(poles) @ (weights_at_start * grid.gain(poles))
+    return np.asarray(means.real)
 
 
 def _split(

@@ -1,7 +1,8 @@
-"""Calls give the same results here, in processes and on a cluster; a process that dies stops nothing."""
+"""Calls give the same results in this process, in other processes and on a cluster; a dead process stops nothing."""
 
 import os
 import signal
+import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -125,6 +126,28 @@ def test_items_are_taken_as_there_is_room(farm: Callable[[], Farm]) -> None:
             assert taken <= done + getattr(workers, "room", 1)
 
 
+def test_an_interrupt_does_not_wait_for_a_lock_of_the_pool() -> None:
+    code = (
+        "import os\n"
+        "from d2rpick.base.workers import Cores\n"
+        "try:\n"
+        "    with Cores(2, 'tests.base.test_workers') as farm:\n"
+        "        farm._pool._shutdown_lock.acquire()\n"
+        "        raise KeyboardInterrupt\n"
+        "except KeyboardInterrupt:\n"
+        "    print('interrupted', flush=True)\n"
+        "    os._exit(0)\n"
+    )
+    with Popen(
+        [sys.executable, "-c", code], cwd=ROOT, stdout=PIPE, text=True
+    ) as process:
+        try:
+            output, _ = process.communicate(timeout=30)
+        finally:
+            process.kill()
+    assert output == "interrupted\n"
+
+
 def test_the_main_thread_holds_no_lock_of_the_pool(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -143,6 +166,32 @@ def test_the_main_thread_holds_no_lock_of_the_pool(
         assert len(list(answers)) == 12
     assert entered
     assert not any(entered)
+
+
+def test_the_end_of_a_pool_does_not_race_with_the_exit_of_python() -> None:
+    """A pause where the handler at exit writes to the pool's pipe makes sure that its thread closes it meanwhile."""
+    code = """
+import time
+from concurrent.futures import process
+from d2rpick.base.workers import Cores
+
+def write_late(pipe):
+    if not pipe._closed:
+        time.sleep(0.3)
+        pipe._writer.send_bytes(b"")
+
+process._ThreadWakeup.wakeup = write_late
+with Cores(2, "json") as farm:
+    print(sorted(answer.result for answer in farm.answers(abs, [1, -2])))
+"""
+    result = subprocess.run(
+        [sys.executable, "-c", code],
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=TIME_LIMIT,
+    )
+    assert (result.stdout, result.stderr) == ("[1, 2]\n", "")
 
 
 def test_there_is_a_core() -> None:

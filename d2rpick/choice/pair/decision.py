@@ -1,4 +1,4 @@
-"""Decide on the verdict for a pair, with its reason, the expected and the worst motion after td, and a better pair.
+"""Decide on the verdict on a pair, its reason, the expected and the worst motion after td, and a better pair.
 
 All commands, output forms and pages use the texts of this module, so that they cannot contradict each other.
 """
@@ -8,8 +8,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.choice.pair.aftermath import bound_mean_energy
-from d2rpick.choice.pair.grades import GOOD, GRADES, POOR, VERDICTS
+from d2rpick.choice.pair.aftermath import MeanEnergyBounds, bound_mean_energy
+from d2rpick.choice.pair.grades import (
+    GOOD,
+    GRADES,
+    MIN_MEAN_ENERGY,
+    POOR,
+    VERDICTS,
+    format_residual,
+)
 from d2rpick.choice.pair.quality import (
     CHOOSE_TIMES_IN_FLIGHT,
     MOST_WORTH_OF_FAIR,
@@ -20,7 +27,6 @@ from d2rpick.vibration.measures import wrong_sign
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from d2rpick.choice.pair.aftermath import MeanEnergyBounds
     from d2rpick.choice.pair.candidates import Candidate, Pair
     from d2rpick.choice.pair.quality import Cause, Quality
     from d2rpick.choice.pair.situation import Situation
@@ -41,7 +47,7 @@ _USE_BEST: Final = (
 _AVOID_BEST: Final = "choose another flight, or make other parts rigid"
 # _USE_COMPARED: the advice that replaces _USE_BEST if a switched run has been compared.
 _USE_COMPARED: Final = "use this pair if only the motion matters"
-# The worst case is shown only if its residual exceeds the expected residual by more than this [-].
+# The worst case is shown if its residual exceeds the expected residual by more than this [-].
 _ALIKE: Final = 5e-3
 
 
@@ -93,7 +99,7 @@ class Decision(NamedTuple):
 
     @property
     def needs_better_record(self) -> bool:
-        """True if the pair cannot be used for a cause that holds for each pair of the record."""
+        """True if the pair cannot be used for a reason that applies to every pair of the record."""
         causes = self.quality.causes
         return self.grade == POOR and any(cause.is_of_record for cause in causes)
 
@@ -114,7 +120,7 @@ class Decision(NamedTuple):
         if self.objections:
             return "; ".join(self.objections)
         if self.grade == POOR and self.quality.grade != POOR:
-            # The error makes the pair inadmissible, however little it matters in the next contact.
+            # The error makes the pair inadmissible, however little it affects the next contact.
             return "; ".join(self.quality.alone.reasons)
         if self.at_rest and not self.quality.reasons:
             return "nothing vibrates in the flight up to td"
@@ -127,7 +133,7 @@ class Decision(NamedTuple):
 
     @property
     def general_reason(self) -> str:
-        """Reason for a verdict other than "use", without numbers, so that several pairs can share it."""
+        """Reason for a verdict other than "use", without numbers, so that several pairs can share the reason."""
         if self.objections:
             return "; ".join(self.objections)
         if self.grade == POOR and self.quality.grade != POOR:
@@ -143,7 +149,7 @@ class Decision(NamedTuple):
 
     @property
     def is_limited_by_raised_grade(self) -> bool:
-        """True if the vibration grade determines the verdict although it was raised because of a negligible error."""
+        """True if the vibration grade decides the verdict after it was raised because of a negligible error."""
         vibration = self.quality.vibration
         is_raised = self.quality.alone.grade != vibration.grade
         return is_raised and vibration.grade == self.grade
@@ -155,24 +161,37 @@ class Decision(NamedTuple):
             return "the same as in the reference run: nothing vibrates in the flight up to td"
         parts = []
         if self.mean_energy_bounds is not None:
+            bounds = format_bounds(self.mean_energy_bounds)
             parts.append(
-                f"mean energy after td {format_bounds(self.mean_energy_bounds)} of the reference run"
+                f"mean energy after td {bounds} of the reference run{self._name_exceeded_limits()}"
             )
         if self.residual is not None:
-            parts.append(f"vibration wrong by {self.residual:.1%}")
+            parts.append(
+                f"vibration wrong by {format_residual(self.residual)} (residual {self.residual:.3f})"
+            )
         return ", ".join(parts) or "unknown: no model of the vibration fits the record"
+
+    def _name_exceeded_limits(self) -> str:
+        """Name the limits of a comparison that a switched run with a usable pair may exceed; empty if it cannot."""
+        if self.grade == POOR or self.is_compared or self.mean_energy_bounds is None:
+            return ""
+        limits = MeanEnergyBounds(MIN_MEAN_ENERGY, 2 - MIN_MEAN_ENERGY)
+        low, high = self.mean_energy_bounds
+        if limits.low <= low and high <= limits.high:
+            return ""
+        return f" (d2rpick verify accepts {format_bounds(limits)} of a switched run)"
 
     @property
     def worst_case(self) -> str:
-        """Description of the worst motion after td that is consistent with the record."""
+        """Description of the worst motion after td that the record does not rule out."""
         if self.at_rest:
             return "the same"
         if self.residual is None:
-            text = f"vibration wrong by {self.worst_residual:.0%}"
+            text = f"vibration wrong by {format_residual(self.worst_residual)}"
             return f"{text}, if the deformation at tr is opposite to that at td"
         if self.worst_residual - self.residual <= _ALIKE:
             return "the same"
-        return f"vibration wrong by {self.worst_residual:.0%}"
+        return f"vibration wrong by {format_residual(self.worst_residual)}"
 
     @property
     def cure(self) -> str:
@@ -188,7 +207,7 @@ class Decision(NamedTuple):
         return join_cures(map(self.specify_cure, self.quality.causes))
 
     def specify_cure(self, cause: Cause) -> str:
-        """Return the advice that removes a cause; other times are not advised if the pair is the best of a td range."""
+        """Return the advice that removes a cause. If the pair is the best of a td range, no other times are advised."""
         if self.best_of is None or not cause.needs_other_times:
             return cause.cure
         low, high = self.best_of
@@ -198,7 +217,7 @@ class Decision(NamedTuple):
 
 
 def join_cures(cures: Iterable[str]) -> str:
-    """Join cures, each once and without those that another one begins with.
+    """Join cures, each only once, and omit those with which a longer cure begins.
 
     Examples
     --------
@@ -224,7 +243,7 @@ def decide(
     is_admissible: bool = True,
     best_residual: float | None = None,
 ) -> Decision:
-    """Return the verdict on a tr; any of the ``objections`` makes it inadmissible, and ``better`` is a better pair.
+    """Return the verdict on a tr, which any of the ``objections`` makes inadmissible; ``better`` is a better pair.
 
     ``is_admissible`` False does so without objections, if they say nothing but that the residual is too large.
     ``best_residual`` is that of the best tr at this td [-]: if it is clearly smaller, tr is to blame.  If there is no
@@ -247,7 +266,7 @@ def decide(
 
 
 def _find_worst_residual(situation: Situation, candidate: Candidate) -> float:
-    """Return the largest residual that is consistent with the record [-]; 0 if nothing vibrates.
+    """Return the largest residual that the record does not rule out [-]; 0 if nothing vibrates.
 
     If the direction of the deformation is unknown, it is that of equal levels with opposite signs.
     """
@@ -259,30 +278,33 @@ def _find_worst_residual(situation: Situation, candidate: Candidate) -> float:
 
 
 def _explain_why_good(quality: Quality, residual: float | None) -> str:
-    """Explain why a pair is good: its vibration is preserved, or the error of its vibration hardly matters."""
+    """Explain why a pair is good: it preserves the vibration, or the error of its vibration hardly matters."""
     if quality.alone.grade == GOOD:
-        error = "" if residual is None else f" with an error of {residual:.1%}"
+        error = (
+            "" if residual is None else f" with an error of {format_residual(residual)}"
+        )
         return f"the flight is certain, and the vibration after td is kept{error}"
     return f"{'; '.join(quality.alone.reasons)}{_explain_raised_grade(quality)}"
 
 
 def _explain_raised_grade(quality: Quality) -> str:
-    """Explain why the error of the vibration hardly matters; empty if this did not raise the grade."""
+    """Explain why the vibration error hardly matters; empty if this did not raise the grade."""
     if quality.worth is None or quality.alone.grade == quality.vibration.grade:
         return ""
     share = quality.worth.share
-    return f", but the energy of this error is at most {share:.2%} of the energy of the next contact"
+    advice = ": use only the motion" if quality.alone.grade == POOR else ""
+    return f", but the energy of this error is at most {share:.2%} of the energy of the next contact{advice}"
 
 
 def format_bounds(bounds: MeanEnergyBounds) -> str:
-    """Format the bounds of the mean energy, as a single number if both have the same digits."""
+    """Format the bounds of the mean energy, or a single number if both bounds have the same digits."""
     low, high = f"{bounds.low:.0%}", f"{bounds.high:.0%}"
     return low if low == high else f"{low} to {high}"
 
 
 def _describe_pair(pair: Pair) -> str:
-    """Describe a pair by its times, with its residual if that is known."""
+    """Describe a pair by its times and, if known, by its residual."""
     times = f"tr = {pair.tr:.6g}, td = {pair.td:.6g}"
     if pair.residual is None:
         return times
-    return f"{times}: vibration wrong by {pair.residual:.1%}"
+    return f"{times}: vibration wrong by {format_residual(pair.residual)}"
