@@ -6,6 +6,7 @@ import signal
 import sys
 
 _SOON = 0.01  # time until an interrupt that was swallowed is repeated [s]
+_PATIENCE = 2.0  # longest wait for other threads at the end of an interrupted run [s]
 
 
 def main() -> None:
@@ -55,7 +56,22 @@ def main() -> None:
         gc.freeze()  # The system frees the memory anyway.
         if interrupts:
             sys.excepthook = lambda *_: None
+            _limit_waiting()
             raise KeyboardInterrupt
+
+
+def _limit_waiting() -> None:
+    """End this process by SIGINT after a while, even if one of its threads does not end.
+
+    Python waits for the threads of a process pool before it ends. The processes of the pool have been interrupted too,
+    at any point of their work.
+    """
+    if os.name == "posix":
+        from threading import Timer
+
+        watch = Timer(_PATIENCE, os.kill, (os.getpid(), signal.SIGINT))
+        watch.daemon = True
+        watch.start()
 
 
 def _fill_closed_streams() -> None:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class FirstRun(NamedTuple):
-    """Result of `first`: the names of the ``files``, the main deck first, and ``notes`` on what is unknown.
+    """Result of `first`: the names of the ``files`` with the main deck first, and ``notes`` on what is unknown.
 
     ``wait`` is the force-free time that counts as flight [time of the deck], ``reason`` its origin.
     """
@@ -136,7 +136,7 @@ def follow(
     Examples
     --------
     >>> import d2rpick as d2
-    >>> [one.event for one in d2.follow("sample_data/rolloverT01.gz", parts="box", lasting=0)][:2]
+    >>> [event.event for event in d2.follow("sample_data/rolloverT01.gz", parts="box", lasting=0)][:2]
     ['begun', 'load']
     """
     from d2rpick.report.follow import (

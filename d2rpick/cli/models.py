@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 _NEEDED: Final = {"required": True}
 
-# Columns of the solver tables, keyed by type of table; each table also has the column time_s.
+# Columns of the solver tables, by type of table; each table also has the column time_s.
 SOLVER = {
     "pairs": ("reference_m", "published_m", "better_m"),
     "run": ("z_m", "y_m", "vz_mps", "vy_mps"),
@@ -107,7 +107,7 @@ def rollover(box: Box, output: Output) -> None:
 
 
 def _run(box: Box, output: Output) -> None:
-    """Compute one run; a plot also needs the reference run."""
+    """Compute one run and, for a plot, the reference run."""
     from d2rpick.report.history_files import BOX_WRITERS, choose_history_format
 
     form = box.write_as or choose_history_format(output.output_file, HISTORIES)

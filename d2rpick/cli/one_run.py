@@ -184,7 +184,7 @@ def suggest(
         times = options.write_times(td=td, td_window=td_window)
         output.answer(answer, question=question.repeated._replace(times=times))
         decision = answer.decision
-    # The best pair for a given td is shown even if it is poor; in this case, the answer and the card say so.
+    # The best pair for a given td is shown even if it is poor; the answer and the card then say so.
     min_quality = request.min_quality or ("poor" if td is not None else "fair")
     _finish_answer(output, question, decision, min_quality)
 
@@ -329,6 +329,8 @@ def verify(
     )
     times = options.write_times(tr=tr, td=td, switched=switched)
     output.answer(answer, question=question.repeated._replace(times=times))
+    if answer.switched and answer.switched.objections:
+        output.finish_with_failed_comparison()
     _finish_answer(output, question, answer.decision, question.settings.min_quality)
 
 
@@ -509,7 +511,7 @@ def plan(
 
 
 def _select_new_cautions(card: JudgedCard | None, plan: Plan) -> list[Caution]:
-    """Return the cautions about the card that the plan does not contain, such as those about unverified windows."""
+    """Return the cautions about the card that the plan lacks, e.g. those about windows without a verdict."""
     if card is None:
         return []
     failed = tuple(
@@ -525,7 +527,7 @@ def _select_new_cautions(card: JudgedCard | None, plan: Plan) -> list[Caution]:
 
 
 def _check_deck(request: Request, cards: Cards, form: str, folder: str | None) -> None:
-    """Before a file is opened, refuse to copy a deck that is not given or to write a card that switches no parts."""
+    """Before any file is opened, refuse to copy a deck that is not given or to write a card that switches no parts."""
     if folder is not None and request.deck is None:
         raise ArgumentError(
             "--write-deck needs `deck`, the deck that is copied with the cards"

@@ -132,6 +132,7 @@ def _plan(driving: Driving) -> list[str]:
     deck = driving.deck
     commands = driving.commands
     bodies = ", ".join(map(str, deck.nodes))
+    parts = "1 part" if len(deck.parts) == 1 else f"{len(deck.parts)} parts"
     return [
         f"copies    {', '.join(deck.files)} to {driving.folder}",
         f"starts    {shlex.join(commands.words('starter', f'{deck.name}_0000.rad'))}",
@@ -141,7 +142,7 @@ def _plan(driving: Driving) -> list[str]:
             if (missing := commands.missing())
             else []
         ),
-        f"switches  {len(deck.parts)} parts by main node {bodies}, to the end at {deck.end:g}",
+        f"switches  {parts} by main node {bodies}, to the end at {deck.end:g}",
     ]
 
 

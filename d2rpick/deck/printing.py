@@ -1,4 +1,4 @@
-"""Print rigid windows as solver input, with one function per solver and a table of the solvers.
+"""Print rigid windows as solver input: one function per solver, and a table of the solvers.
 
 LS-DYNA: a pair of *DEFORMABLE_TO_RIGID_AUTOMATIC cards for each window. Radioss: engine files that end at the switching
 times, with /RBODY/ON and /RBODY/OFF, or time sensors that switch within one engine run.
@@ -49,7 +49,7 @@ if TYPE_CHECKING:
 
 _FILE: Final = "switches.k"
 
-# CODE values that wait until a force ends and until a force acts, keyed by kind of contact.
+# CODE values that wait until a force ends and until a force acts, by kind of contact.
 _CODES: Final = {"INTER": (2, 4), "RWALL": (1, 3)}
 _OF_OFFSET: Final = "OFFSET was not tested with the solver: it should exceed the thickness of the contact."
 _LEFT_ACTIVE = (
@@ -57,9 +57,14 @@ _LEFT_ACTIVE = (
     "  (NRBF, NCSF, RWF 0). If there are any, set 1 (delete) on the first card and",
     "  2 (activate again) on the second.",
 )
-_DELETED = (
-    "Nodal rigid bodies, joints and extra nodes of the deck, which all lie on these",
-    "  parts, are deleted (NRBF, NCSF 1) while these are rigid, and activated again (2).",
+_NODAL_BODIES_DELETED = (
+    "Nodal rigid bodies and generalized welds of the deck, which all lie on these",
+    "  parts, are deleted (NRBF 1) while these are rigid, and activated again (2).",
+)
+_NODE_SETS_DELETED = (
+    "Joints, extra nodes, spotwelds and other nodal constraints of the deck, which",
+    "  all lie on these parts, are deleted (NCSF 1) while these are rigid, and",
+    "  activated again (2).",
 )
 _SEPARATE = (
     "CHECK BEFORE USE: each part becomes a rigid body of its own (LRB 0). This is",
@@ -110,7 +115,7 @@ def _print_ls_dyna(
     ids = check_ids(printing.part)
     sets = list(_number_switch_sets(printing.swset, len(windows)))
     if printing.merge is not None:
-        # The lead id follows another id on the same line, with a space in between.
+        # The lead id follows another id on the same line, after a space.
         check_ids([printing.merge], LONGEST)
     texts = [(write_number(tr), write_number(td)) for tr, td in windows]
     _check_printed([text for pair in texts for text in pair])
@@ -230,15 +235,18 @@ def _note_roundings(times: Times, texts: tuple[str, str]) -> Iterator[str]:
     for name, value, text in zip(("tr", "td"), times, texts, strict=True):
         if float(text) != value:
             error = f"nearest in {LONGEST} characters, error {float(text) - value:+.1e}"
-            yield f"{name} = {value!r} is rounded to {text} ({error})."
+            yield f"{name} = {value:.12g} is rounded to {text} ({error})."
 
 
 def _write_warnings(ids: Sequence[int], printing: Printing) -> Iterator[str]:
     """Yield the comment lines of an LS-DYNA card."""
-    deleted = printing.delete_nodal_bodies or printing.delete_node_sets
+    deleted = (
+        *(_NODAL_BODIES_DELETED if printing.delete_nodal_bodies else ()),
+        *(_NODE_SETS_DELETED if printing.delete_node_sets else ()),
+    )
     yield from (
         *PHYSICS,
-        *(_DELETED if deleted else _LEFT_ACTIVE),
+        *(deleted or _LEFT_ACTIVE),
         "Springs and dampers are not switched.",
         _CAPPED,
     )
@@ -378,7 +386,7 @@ def _print_sensors(
         f"The largest step, {cap:.4g}, holds for the whole run, which takes {fewest_cycles} cycles at least;"
         " if it takes fewer without switching, set --step-cap to at least the deformable time step."
     )
-    # The note is written to the file as well, because the file may be used without the card.
+    # The note is also written to the file, because the file may be used without the card.
     comments = [f"# {line}" for line in write_comments([step_warning])]
     lines = (
         f"/RUN/{printing.name}/1",

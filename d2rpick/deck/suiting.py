@@ -54,8 +54,12 @@ def find_suiting(path: str, parts: Collection[int]) -> Suiting:
             "radioss", find_name_of_files(run), legs[-1].stop.value if has_end else None
         )
     deck = read_deck(path)
-    bodies = [*read_constraints(deck, "nodal rigid body")]
-    further = [*read_constraints(deck, "extra nodes", "joint")]
+    bodies = [*read_constraints(deck, "nodal rigid body", "generalized weld")]
+    further = [
+        *read_constraints(
+            deck, "extra nodes", "joint", "spotweld", "rivet", "constrained node set"
+        )
+    ]
     nodal, by_set = (
         _is_on_parts(constraints, parts, deck) for constraints in (bodies, further)
     )
@@ -63,7 +67,7 @@ def find_suiting(path: str, parts: Collection[int]) -> Suiting:
 
 
 def find_name_of_files(run: RadiossRun) -> str | None:
-    """Return the common beginning of a run's file names, by which the engine finds the restart file.
+    """Return the beginning that a run's file names share, by which the engine finds the restart file.
 
     If the files have no common name, return the name in /RUN.
     """
@@ -99,9 +103,8 @@ def _is_on_parts(
     nodes_elsewhere = find_first_parts(cards, other_parts)
     return all(
         constraint.part in parts
-        or (
-            constraint.nodes & nodes_on_parts.keys()
-            and not constraint.nodes & nodes_elsewhere.keys()
-        )
+        if constraint.part
+        else constraint.nodes & nodes_on_parts.keys()
+        and not constraint.nodes & nodes_elsewhere.keys()
         for constraint in constraints
     )

@@ -36,7 +36,7 @@ LEG_HEAD = ("leg", "step", "elements", "rigid nodes")
 
 
 def as_table(calibration: FittedWeights, display: DisplayOptions) -> str:
-    """Return a table of the assumed and fitted weight of each formulation, and a table of the restart segments used."""
+    """Return a table of each formulation's assumed and fitted weight, and a table of the restart segments used."""
     weights = calibration.weights
     lines = [
         tables.as_text(HEAD, _list_weight_rows(calibration), display.width), "",

@@ -43,7 +43,7 @@ JOURNAL: Final = "drive.ndjson"
 # Largest time step of a rigid engine run, relative to the mean time step of the deformable engine runs [-].
 # With this time step, a rigid engine run costs a few percent of a deformable one and still resolves contacts.
 _STEP_RATIO: Final = 5.0
-# A flight too short to be switched is reported if it lasts at least this fraction of the required time [-].
+# A flight too short to be switched is reported if it lasts for at least this fraction of the required time [-].
 _REPORTED: Final = 0.5
 # _PAUSE: time between two checks of the solver [s].
 # _SILENT: time without solver output after which the driver reports this silence [s].
@@ -91,7 +91,7 @@ class Driver:
     at: Order | None = None
 
     def prepare(self) -> None:
-        """Copy the deck into the folder and run the starter, unless an earlier driver has already done this.
+        """Copy the deck into the folder and run the starter, unless an earlier driver has done this.
 
         Raises
         ------
@@ -101,7 +101,7 @@ class Driver:
         self._wait_for_end()  # An earlier driver may have left a solver running.
         if self.journal.has("prepared") and self.solver.whole(0):
             return
-        # The first engine file is needed at this point, because the starter reads /RBODY/OFF from it.
+        # The first engine file is needed now, because the starter reads /RBODY/OFF from it.
         engine_file = self.solver.file(1, ".rad").name
         files = {engine_file: self.deck.leg(1, self.deck.end, None), **self.deck.files}
         for name, content in files.items():
@@ -140,7 +140,7 @@ class Driver:
                 self._go_back("the engine run after it has failed")
         while order := self._choose_next():
             self.at = order
-            # An earlier driver may have started the engine run, and the solver may have finished it since then.
+            # An earlier driver may have started the engine run, and the solver may have finished it in the meantime.
             begun = self.journal.records[-1].get("order") == [*order]
             if not begun or self._find_problem(order):
                 self._start(order)
@@ -213,7 +213,7 @@ class Driver:
         return "the engine run left no complete restart file; make room on the disk, then --resume"
 
     def _recover(self, order: Order, problem: str) -> None:
-        """Record in the journal that an engine run failed; if its files are incomplete, it is computed once more.
+        """Record in the journal that an engine run failed. If its files are incomplete, the run is computed once more.
 
         Raises
         ------
@@ -251,7 +251,7 @@ class Driver:
 
 
 def _limit_step(order: Order, legs: Sequence[Leg], interval: float) -> float | None:
-    """Return the largest time step of a rigid engine run [time], from the smallest mean step of the deformable ones."""
+    """Return the largest time step of a rigid engine run [time], which depends on the smallest mean deformable step."""
     if not order.rigid:
         return None
     steps = [
@@ -302,7 +302,7 @@ def find_leg_results(order: Order, evidence: GrowingEvidence) -> LegFindings:
 
 
 def _choose_end(order: Order, history: History, free: float) -> float:
-    """Choose tr: the start of an engine run in flight if it has more internal energy than the end, else the end."""
+    """Choose tr: the start of an engine run in flight if its internal energy is higher there, otherwise its end."""
     start = max(order.start, history.start)
     falls = history.energy_at(start) > history.energy_at(history.end)
     if falls and order.start >= max(free, order.switch_after):
@@ -311,7 +311,7 @@ def _choose_end(order: Order, history: History, free: float) -> float:
 
 
 class Journal:
-    """The journal of a driven run. Records are only appended, and each record is on the disk when `add` returns.
+    """The journal of a driven run. Records are only appended; each record is on the disk when `add` returns.
 
     A cut or damaged line is ignored: what it reports is done again.
     """
@@ -326,7 +326,7 @@ class Journal:
 
     @property
     def legs(self) -> list[Leg]:
-        """Computed engine runs, except those undone by a restart from an earlier time."""
+        """Computed engine runs, except those that a restart from an earlier time has undone."""
         legs: list[Leg] = []
         for record in self.records:
             if record["event"] == "ended":

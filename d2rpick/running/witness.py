@@ -1,4 +1,4 @@
-"""Find the force-free time of the given parts, or of the model, at each state of a record from the states so far.
+"""Find, at each state of a record, the force-free time of the given parts or the model from the states so far.
 
 In this time the momentum less gravity and damping is constant within 1e-4 of its largest value so far.  If no momentum
 is written, the contact energy is constant instead.  A flight is seen once this has lasted for the wait, since a force
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     # Returns the gravity between two states, None if another force acts or a support holds parts.
     FindGravity = Callable[["GrowingWitness", int, int], float | None]
 
-# Largest change of a momentum or contact energy that counts as constant, relative to its largest value so far [-].
+# Changes of a momentum or contact energy up to this fraction of its largest value so far are treated as zero [-].
 # CONSTANT is 10 times the error of single-precision sums.
 CONSTANT: Final = 1e-4
 # Time between two tests for a force, as a fraction of the force-free time so far [-].
@@ -176,7 +176,7 @@ class GrowingWitness:
         return momentum, float(tolerance[last])
 
     def _find_first_without_force(self, earliest: int, last: int) -> int:
-        """Return the first state, not before ``earliest``, from which no force acts until the state ``last``."""
+        """Return the first state from ``earliest`` on from which no force acts until the state ``last``."""
         if self.misfit(earliest, last) <= 1:
             return earliest
         return find_farthest(
@@ -188,7 +188,7 @@ class GrowingWitness:
         find_wait: Callable[[float, float], Wait | None],
         find_gravity: FindGravity,
     ) -> None:
-        """Add the flights and the ended force-free times that the new states show.
+        """Add the flights and the completed force-free times that the new states show.
 
         ``find_wait`` returns the waiting time for a flight since a time from the states up to a later one, or None.
         """
@@ -247,7 +247,7 @@ class GrowingWitness:
         )
 
     def _find_level(self, first: int, last: int) -> float | None:
-        """Return when the centre of mass is as high again as at ``first`` [time]; None if that is before ``last``."""
+        """Return when the centre of mass is again as high as at ``first`` [time]; None if that is before ``last``."""
         begin, end = self._columns.rows[[first, last]]
         gained = end[2:] - begin[2:]
         time_to_level = (

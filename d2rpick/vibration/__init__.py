@@ -66,7 +66,7 @@ if TYPE_CHECKING:
 def find_models(
     history: History, flight: Span, settled: Span, *, together: VibratingTogether
 ) -> dict[str, SignedModel]:
-    """Search a ``flight`` for models of the energy, best model first, until one gives the sign of the deformation.
+    """Search a ``flight`` for models of the energy, best model first, until a model gives the sign of the deformation.
 
     Swings are counted in the flight from when the energy has ``settled``, which may be before it.
     """
@@ -77,7 +77,7 @@ def find_models(
     modal = _find_modal(history, *ends, together=together) if ends else None
     if modal is not None:
         models["modal"] = modal
-        # If the modes are very uncertain, counted half cycles of the energy may be more accurate.
+        # If the modes are very uncertain, the model that counts half cycles of the energy may be more accurate.
         if modal.signed and not modal.is_vague:
             return _rely_on_vague(models)
     ends = get_ends(history.between(*settled)[0])
@@ -107,7 +107,7 @@ def _find_modal(
 
 @remember
 def _find_swings(history: History, first: float, last: float) -> Swings | None:
-    """Count the half cycles of the energy if it returns to a common minimum in each of them."""
+    """Count the half cycles of an energy that returns to a common minimum in each half cycle."""
     from d2rpick.vibration.swings import count_swings
 
     return count_swings(*history.between(first, last))

@@ -1,4 +1,4 @@
-"""Measure the indications that a record is not that of a linear structure in free flight, and explain refusals."""
+"""Measure the signs that a record does not come from a linear structure in free flight, and explain refusals."""
 
 from __future__ import annotations
 
@@ -28,19 +28,19 @@ _MOST_MISFIT: Final = 0.3
 MOST_NEGATIVE, _MOST_NEGATIVE_AT_ALL = 0.07, 0.5
 # Largest accepted change of the static energy in a record, relative to the mean vibration energy [-].
 _MOST_DRIFT: Final = 0.6
-# The overlap may exceed its bounds by at most this fraction of the vibration energy (rms) [-].
+# The overlap of the deformations at tr and td may exceed its bounds by this fraction of the vibration energy [-].
 MOST_BEYOND: Final = 0.12
 # Largest accepted height of the harmonics, relative to their fundamental line [-].
 _MOST_HARMONIC: Final = 0.05
-# _MOST_UNSTRETCHED: largest shortfall of the static energy of a static deformation, per mean vibration energy [-].
+# _MOST_UNSTRETCHED: a static deformation may lack this static energy, relative to the mean vibration energy [-].
 # _MOST_UNSTRETCHED_AT_ALL: limit that replaces _MOST_UNSTRETCHED if there is no better model [-].
 _MOST_UNSTRETCHED, _MOST_UNSTRETCHED_AT_ALL = 0.15, 0.6
-# Smallest number of states in an accepted record per period of the highest-frequency strong line.
+# Smallest number of states per period of the highest-frequency strong line in an accepted record.
 _FEWEST_PER_PERIOD: Final = 2.4
 
 
 class Doubts(NamedTuple):
-    """Indications that a record is not that of a linear structure in free flight; 0 means no doubt [-].
+    """Signs that a record does not come from a linear structure in free flight; 0 means no doubt [-].
 
     ``missed`` and ``misfit`` are relative to the swing of the energy, ``negative``, ``drift`` and ``unstretched`` to
     the mean vibration energy, ``beyond`` to the vibration energy; ``harmonic`` is the size of lines locked to a first
@@ -63,7 +63,7 @@ class Doubts(NamedTuple):
 
     @property
     def refusal_at_all(self) -> str | None:
-        """Return the reason why the record is refused even if there is no better model; None if it is then accepted."""
+        """Return the reason why the record is refused even if no better model exists; None if it is then accepted."""
         return self._first_of(_MOST_NEGATIVE_AT_ALL, _MOST_UNSTRETCHED_AT_ALL)
 
     def _first_of(self, most_negative: float, most_unstretched: float) -> str | None:

@@ -81,7 +81,7 @@ class LineScatter:
         return waves._replace(weights=waves.weights * self.grid.gain(waves.poles))
 
     def _compute_gradient(self, tr: Samples, td: Samples) -> Samples:
-        """Return the derivatives of the squared residual by the parameters, shape (n, p) [1/energy, time/1].
+        """Return the derivatives of the squared residual by all parameters, shape (n, p) [1/energy, time/1].
 
         R^2 = 1 + [V(tr) - 2 V(m) + H(m) - C(tr, td)] / H(td), the small change of U within a period left out.
         """

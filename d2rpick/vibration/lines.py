@@ -57,7 +57,7 @@ _LEAST_TURNS, _SURE_TURNS, _MOST_DAMPED, _MOST_DECAY = 0.25, 1.0, 0.35, 40.0
 # Largest exponent by which noise may make a vibration seem to grow over the record [-].
 _MOST_GROWTH: Final = 0.2
 # _MOST_DECAYS: largest number of decaying exponentials that the mean contains in addition to a constant.
-# _SAME_DECAY: smallest difference between the exponents by which two exponentials decay over the record [-].
+# _SAME_DECAY: two exponentials are distinguished if their decays over the record differ by at least this exponent [-].
 _MOST_DECAYS, _SAME_DECAY = 4, 0.05
 
 
@@ -198,7 +198,7 @@ class Spectrum(NamedTuple):
 
     @property
     def error(self) -> float:
-        """Return the rms misfit [energy]."""
+        """Return the rms misfit of the spectrum [energy]."""
         return float(np.sqrt(np.mean(self.rest**2)))
 
     def turned(self) -> Spectrum:
@@ -292,14 +292,14 @@ def predict(grid: Grid) -> Prediction | None:
 
 
 def _get_needed(spectrum: Spectrum) -> float:
-    """Return the factor by which more exponentials must reduce the prediction error of a spectrum [-]."""
+    """Return the factor by which additional exponentials must reduce the prediction error of a spectrum [-]."""
     powers = np.abs(np.fft.rfft(spectrum.rest)) ** 2
     typical = float(np.mean(powers))
     return _BETTER if powers.max() > _OF_A_LINE * typical else _CLEARLY_BETTER
 
 
 class _SignalSpace:
-    """The signal subspace, spanned by the windows of a record, with its directions in descending order of size."""
+    """The signal subspace spanned by the windows of a record; its directions are in descending order of size."""
 
     def __init__(self, vectors: Samples, step: float) -> None:
         self.vectors, self.step = vectors, step
@@ -329,7 +329,9 @@ class _SignalSpace:
 def fit_spectrum(
     grid: Grid, poles: Complex, span: float, *, every_decay: bool = False
 ) -> Spectrum:
-    """Fit lines and mean with the given poles to a grid; poles must differ within ``span`` [time].
+    """Fit lines and a mean with the given poles to a grid.
+
+    Decays that cannot be distinguished within ``span`` are merged.
 
     If ``every_decay`` is True, the mean contains the decay of each line, which noise permits only for few lines.
     """

@@ -124,7 +124,7 @@ def level_error(energy: Samples | float, level: Samples | float) -> Samples:
     comparable = (energy >= 0) & (level > 0)
     with np.errstate(
         over="ignore"
-    ):  # Relative to a level near zero, the error of any other energy may overflow to infinity.
+    ):  # If the level is near zero, the relative error of any other energy may overflow to infinity.
         square = np.divide(
             energy, level, out=np.full(energy.shape, np.nan), where=comparable
         )

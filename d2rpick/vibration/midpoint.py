@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Reading:
-    """An interpretation of a spectrum, which states which of its lines are modes.
+    """An interpretation of a spectrum: which of its lines are modes.
 
     ``is_mode`` (k,) marks modes; other lines are those of a stretch, which does not vibrate.  If ``no_static`` is True
     all of the mean is vibration, else the modes have half of it and the rest is static.  ``rest`` is the part of the

@@ -75,7 +75,7 @@ _FINER: Final = 4
 _LITTLE_LEFT, _LITTLE_MISSED, _EXACT, _SLOW_TOO = 0.05, 0.2, 0.1, 0.2
 
 # _LEAST_HALF: half-width of the error band of the squared residual before known errors widen the band [-].
-# _NOT_LINEAR: relative error of a deformation because real structures are nonlinear [-].
+# _NOT_LINEAR: relative error of a deformation that results from the nonlinearity of real structures [-].
 # The residual R of a shell box deviated by 0.015 to 0.018 (rms) from the R computed with all its nodes.
 _LEAST_HALF, _NOT_LINEAR = 0.006, 0.015
 # Modes are poorly identified if the half-width of the error band of the squared residual exceeds this [-].
@@ -91,7 +91,7 @@ _CHANCE: Final = 2.0
 # _NEGATIVE_COUNTS: effect of a negative or too small static energy on the squared residual, per relative error [-].
 _DRIFT_COUNTS, _NEGATIVE_COUNTS = 0.35, 1.4
 # _BENT_ALIKE: effect of the second harmonic of a stiffening spring on the squared residual of equal deformations [-].
-# _BENT_ACROSS: additional effect of the second harmonic on the squared residual of orthogonal deformations [-].
+# _BENT_ACROSS: additional effect of the second harmonic on the squared residual if the deformations are orthogonal [-].
 _BENT_ALIKE, _BENT_ACROSS = 3.0, 5.0
 # Largest possible squared residual, which is that of equal and opposite deformations [-].
 _MOST_OPPOSED: Final = 4.0
@@ -181,12 +181,12 @@ class ModalVibration:
 
     @property
     def convinces(self) -> bool:
-        """Return True if the modes predict the record so well that no load can act in it."""
+        """Return True if the modes predict the record so accurately that no load can act in it."""
         return self._predicts_within(1.0)
 
     @property
     def is_exact(self) -> bool:
-        """Return True if the modes predict the record much better than required."""
+        """Return True if the modes predict the record much more accurately than required."""
         return self._predicts_within(_EXACT)
 
     def _predicts_within(self, share: float) -> bool:
@@ -218,7 +218,7 @@ class ModalVibration:
         return min(float(self.time[0]), td)
 
     def known_at(self, td: float) -> bool:
-        """Return True if the modes were identified at td and their energy exceeds the error of the solver."""
+        """Return True if the modes were identified at td and their energy exceeds the solver error."""
         level = self.reading.level(np.append(self.time[[0, -1]], td))
         return bool(
             self.time[0] <= td <= self.time[-1]
@@ -353,7 +353,7 @@ class ModalVibration:
         return measures.band_about(np.square(stated), off, above, below)
 
     def unseen(self, tr: Samples | float, td: float) -> Samples:
-        """Return the fraction of vibration energy at td that a hidden mode needs to explain the band of each tr [-].
+        """Return the vibration energy fraction that a hidden mode needs at td to explain the error band of each tr [-].
 
         A hidden mode in opposite phase at tr and td adds four times its share to the squared residual.
         """
@@ -415,7 +415,7 @@ class ModalVibration:
 
     @cached_property
     def has_slow_mode(self) -> bool:
-        """Return True if the energy of some mode does not complete a cycle in the window."""
+        """Return True if the energy of at least one mode does not complete a cycle in the window."""
         window = float(self.time[-1] - self.time[0])
         return bool(np.any(self.reading.modes.poles.imag * window < 2 * np.pi))
 
@@ -507,7 +507,7 @@ def _can_decide(internal: ModalVibration, kinetic: ModalVibration) -> bool:
 def _predicts_within(
     share: float, missed: float, misfit: float, systematic: float
 ) -> bool:
-    """Return True if the error of the lines, apart from white noise, is below ``share`` of the acceptable error.
+    """Return True if the error of the lines, apart from white noise, is below the ``share`` of the acceptable error.
 
     ``missed`` and ``misfit`` as in `Doubts`; neighbouring states share the fraction ``systematic``.
     """
@@ -611,7 +611,7 @@ def _read(
 
 
 def _add_hidden_pairs(reading: Reading, systematic: float) -> Reading:
-    """Return a reading with the vibration energy that has no lines, from what its own modes leave of the mean."""
+    """Add to an interpretation the vibration energy without lines that its own modes leave in the mean energy."""
     spectrum = reading.spectrum
     level = reading.level_of_modes(reading.times)
     static = spectrum.mean.at(reading.times) - level / 2
@@ -698,7 +698,7 @@ def _compute_sine(squared: Samples) -> Samples:
 
 
 def _count_states(lines: Exponentials, grid: Grid, scatter: float) -> float:
-    """Return the number of states per period of the highest-frequency relevant line that is stronger than noise."""
+    """Return the number of states per period of the highest-frequency relevant line that exceeds the noise."""
     sizes = np.abs(lines.weights)
     least = max(NOTABLE * float(sizes.max(initial=0.0)), ABOVE_SCATTER * scatter)
     fastest = float(lines.poles.imag[sizes > least].max(initial=0.0))

@@ -5,11 +5,12 @@ that run a line with this constant are asked again, until a few answers have cha
 One question of each kind is asked before the next one of any kind.  Every trial is a fork of a process that has
 imported everything and asked nothing.
 
-The table docs/developing/deciding-numbers.csv shows how many answers changed, and the first change of each.  Its rows
+The table docs/developing/deciding-numbers.csv shows how many answers changed, and the first change of each. Its rows
 of deciding constants are kept; constants that have changed no answer so far, or have another value, are tried again,
-with other questions if ``--seed`` is another one.  A constant that changes no answer is a guard against round-off,
-overflow or damaged input, a limit of time or memory, a threshold of cases that the questions do not contain, or not
-needed.
+with other questions if ``--seed`` is another one. The table is written after each constant, so ``--resume`` continues
+a stopped run: it keeps all rows of constants that were tried. A constant that changes no answer is a guard against
+round-off, overflow or damaged input, a limit of time or memory, a threshold of cases that the questions do not
+contain, or not needed.
 """
 
 from __future__ import annotations
@@ -320,6 +321,11 @@ def main() -> None:
         default=3.0,
         help="questions that take longer are left out [s, with line tracing]",
     )
+    parser.add_argument(
+        "--resume",
+        action="store_true",
+        help="keep the rows of constants that changed nothing, too",
+    )
     parser.add_argument("names", nargs="*", help="parts of the names of constants")
     options = parser.parse_args()
     sources = read_sources()
@@ -330,9 +336,13 @@ def main() -> None:
         trials = Trials(sources, questions, options.longest)
         for name, constant in trials.constants.items():
             row = rows.get(name)
-            is_known = row and row.decides and row.value == f"{constant.value}"
+            is_done = (
+                row is not None
+                and row.value == f"{constant.value}"
+                and (options.resume or row.decides)
+            )
             is_named = not options.names or any(part in name for part in options.names)
-            if is_known or not is_named:
+            if is_done or not is_named:
                 continue
             outcomes = {
                 way: trials.try_factor(name, factor, options.seconds)

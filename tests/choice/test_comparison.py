@@ -30,6 +30,7 @@ from tests.command import (
     BOX,
     ENERGY,
     ROLLOVER,
+    join_wrapped_lines,
     make_replay_file as motion,
     put,
     read_refusal,
@@ -123,6 +124,20 @@ def test_a_mean_energy_that_is_another_one_is_an_objection() -> None:
         in reason
     )
     assert verify_rollover("--min-mean-energy", "0.6")["verified"]
+
+
+@pytest.mark.parametrize("grade", ["poor", "fair"])
+def test_a_failed_comparison_is_a_failure_whatever_grade_is_accepted(
+    grade: str,
+) -> None:
+    accepting = (*VERIFY, BOX, "--switched", LEGS, "--min-quality", grade)
+    failed = run(*accepting)
+    assert failed.exit_code == 1
+    assert "comparison failed" in join_wrapped_lines(failed.stdout)
+    assert failed.stderr.count("exit code") == 1
+    assert "the comparison with the switched run failed" in failed.stderr
+    assert run(*accepting, "--exit-zero").exit_code == 0
+    assert run(*accepting, "--min-mean-energy", "0.6").exit_code == 0
 
 
 def test_the_times_are_read_off_the_switched_run() -> None:

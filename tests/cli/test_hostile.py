@@ -130,6 +130,21 @@ def test_an_interrupt_that_a_library_swallows_ends_the_program_all_the_same(
     assert process.returncode == -signal.SIGINT
 
 
+def test_an_interrupt_ends_the_program_though_a_thread_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Python waits for all threads at its end, and a thread may wait for a process that has died."""
+    (tmp_path / "click.py").write_text(
+        "import os, signal, threading, time\n"
+        "threading.Thread(target=time.sleep, args=(300,)).start()\n"
+        "os.kill(os.getpid(), signal.SIGINT)\n"
+    )
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), str(ROOT)]))
+    with start_program("info", ENERGY) as process:
+        assert process.communicate(timeout=30) == (b"", b"")
+    assert process.returncode == -signal.SIGINT
+
+
 def test_an_interrupt_while_a_class_is_made_is_no_error_of_the_program(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

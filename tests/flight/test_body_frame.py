@@ -1,6 +1,6 @@
 """A tumbling box whose parts lie on a line: its motion follows from written nodes, else from the kinetic energy."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 from types import SimpleNamespace
 from typing import cast
@@ -142,6 +142,15 @@ def find_drift_of_box(
         moved = box.corners[:, columns] - CORNERS[columns]
         return NodeMotion(TIME[states], written, moved[states]) if written else None
 
+    return find_drift_with_nodes(box, read_displacements, first)
+
+
+def find_drift_with_nodes(
+    box: Box,
+    read_displacements: Callable[[Sequence[int]], NodeMotion | None],
+    first: int = 0,
+) -> Drift | None:
+    """Return the drift in a record that begins with state ``first`` and whose nodes are read by a function."""
     flying = Flying(make_momenta_of_box(box, first), MASSES, range(4), START, END)
     return find_drift(flying, make_deck(), read_displacements)
 
