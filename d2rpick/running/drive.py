@@ -116,13 +116,6 @@ class Driver:
             )
         self.journal.add("prepared")
 
-    def progress(self, seconds: float) -> str:
-        """Describe the engine run being computed, or how many ``seconds`` the starter has run before the first one."""
-        leg = self.at
-        if leg is None:
-            return f"starting ... {seconds:.0f} s"
-        return f"engine run {leg.number}, {leg.kind}: {leg.start:.6g} to {leg.until:.6g} of {self.limits.end:g}"
-
     def run(self) -> None:
         """Compute one engine run after another, up to the end of the run.
 
