@@ -1,4 +1,4 @@
-"""The indexes of the frequently asked questions: each question with a link, and the bold text that begins its answer.
+"""The indexes of the frequently asked questions: each question with a link, and the bold text of its answer.
 
 ``python -m tests.questions`` writes them to docs/how-to/faq.md (planning a switch) and switched-faq.md (cards,
 switched run and CI), so that each can be scanned at a glance; a test holds them current.

@@ -47,13 +47,13 @@ from tests.benchmarks.deciding_constants import (
 from tests.benchmarks.deciding_questions import Answer, Question, make_questions
 
 FACTORS: Final = {"halved": 0.5, "doubled": 2.0}
-# This number of changed answers shows that a constant decides; no further questions are asked.
+# After this number of changed answers, a constant is known to decide, and no further questions are asked.
 ENOUGH: Final = 3
-# A question takes at most this many times its usual duration, plus seconds; a scaled number of steps may take forever.
+# A question may take this multiple of its usual duration, plus these seconds; scaled step numbers may take forever.
 _PATIENCE, _LEAST_PATIENCE = 20.0, 5.0
-# Longest text of a value, or of a question, in the table.
+# Largest number of characters of a value or a question in the table.
 _TEXT = 24
-# End of the first sentence of a comment, which says what a constant decides; the others give its source or the reason.
+# End of the first sentence of a comment, which says what a constant decides; the others give the source or reason.
 _FIRST_SENTENCE: Final = re.compile(r"(?<=\.) (?=[A-Z_])")
 
 _HEAD: Final = (
@@ -68,7 +68,7 @@ _HEAD: Final = (
 
 
 class Baseline(NamedTuple):
-    """Unchanged answer to a question, its duration [s], and the lines with constants that it runs."""
+    """Unchanged answer to a question, its duration [s], and those lines with constants that it executes."""
 
     answer: Answer
     seconds: float
@@ -76,7 +76,7 @@ class Baseline(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """Number of questions asked with a scaled constant, and the changes of the answers by question."""
+    """Number of questions asked with a scaled constant, and the changed answers by question."""
 
     asked: int
     changes: dict[str, str]
@@ -98,11 +98,11 @@ class Row(NamedTuple):
 
 
 class OutOfTimeError(BaseException):
-    """A question takes far longer than usual."""
+    """Raised if a question takes far longer than usual."""
 
 
 class Trials:
-    """Questions and constants, and how to ask the questions with scaled constants."""
+    """Questions and constants, with methods that ask the questions with scaled constants."""
 
     def __init__(
         self,
@@ -133,7 +133,7 @@ class Trials:
         }
 
     def find_touched(self, name: str) -> list[str]:
-        """List the questions that run a line with a constant, the quickest of each kind first."""
+        """List the questions that execute a line with a constant, starting with the quickest of each kind."""
         lines = self.uses[name].lines
         touched = [
             question
@@ -172,7 +172,7 @@ class Trials:
 
 
 def ask_safely(question: Question, usual_seconds: float) -> Answer:
-    """Return the answer to a question, or the first words of what went wrong."""
+    """Return the answer to a question; if it fails, return the first words of the error."""
 
     def stop(*_: object) -> None:
         raise OutOfTimeError
@@ -192,7 +192,7 @@ def ask_safely(question: Question, usual_seconds: float) -> Answer:
 
 
 def measure_baseline(question: Question, lines: frozenset[Line]) -> Baseline:
-    """Ask a question once, and note which of these lines it runs."""
+    """Ask a question once, and record which of these lines it executes."""
     lines_by_file: dict[str, set[int]] = defaultdict(set)
     for line in lines:
         lines_by_file[line.file].add(line.number)
@@ -222,7 +222,7 @@ def measure_baseline(question: Question, lines: frozenset[Line]) -> Baseline:
 
 
 def describe_change(before: Answer, after: Answer, place: str = "") -> str:
-    """Return the first difference of two answers as ``place: before → after``; empty if there is none."""
+    """Return the first difference between two answers as ``place: before → after``; empty if they are equal."""
     if isinstance(before, dict) and isinstance(after, dict):
         for key in {**before, **after}:
             change = describe_change(
@@ -249,7 +249,7 @@ def describe_change(before: Answer, after: Answer, place: str = "") -> str:
 
 
 def call_in_child(function: Callable[[], Any]) -> Any:
-    """Call a function in a forked process, which leaves nothing behind in this one."""
+    """Call a function in a forked process, so that it changes nothing in this process."""
     context = multiprocessing.get_context("fork")
     receiver, sender = context.Pipe(duplex=False)
 
@@ -281,7 +281,7 @@ def make_row(constant: Constant, outcomes: Mapping[str, Outcome]) -> Row:
 
 
 def read_table(path: Path) -> dict[str, Row]:
-    """Return the rows of an earlier table by the names of their constants; empty without a table."""
+    """Return the rows of an earlier table by the names of their constants; empty if there is no table."""
     if not path.exists():
         return {}
     with path.open(encoding="utf-8", newline="") as file:

@@ -1,4 +1,4 @@
-"""A run folder is enough input: its main deck is found, named and used, and cards are checked before printing."""
+"""A run folder is sufficient input: its main deck is found, named and used, and cards are checked before printing."""
 
 import re
 import shutil
@@ -25,7 +25,7 @@ ENGINE = "/RUN/CAR/1\n0.26\n/VERS/2022\n/DT\n0.9 0.0\n/TFILE/4\n0.0001\n"
 
 
 def write_run_folder(path: Path, extra_keywords: str = DATABASES) -> Path:
-    """Write the sample run with its deck, with other keywords instead of those for the output."""
+    """Write the sample run with its deck, with other keywords in place of those for the output."""
     path.mkdir(exist_ok=True)
     shutil.copy(MATSUM, path / "matsum")
     model = DECK.read_text("utf-8").partition("*DATABASE")[0]

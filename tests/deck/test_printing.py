@@ -152,7 +152,7 @@ def test_a_file_of_windows() -> None:
 
 
 def test_windows_are_read_from_the_journal_of_a_driven_run() -> None:
-    """A leg replaces one with the same number: of a probe that went too far, or of a skipped flight."""
+    """A leg replaces a leg with the same number, for example a probe that went too far or a skipped flight."""
     legs = [("load", 1, 0.0, 0.06), ("probe", 2, 0.06, 0.1), ("probe", 3, 0.1, 0.2), ("rigid", 3, 0.1, 0.145),
             ("load", 4, 0.145, 0.16), ("probe", 5, 0.16, 0.17), ("load", 5, 0.16, 0.2), ("probe", 6, 0.2, 0.3),
             ("probe", 7, 0.3, 0.32), ("load", 7, 0.3, 0.4), ("load", 8, 0.4, 0.5)]  # fmt: skip
@@ -218,11 +218,20 @@ def test_the_check_finds_in_a_card_what_was_asked_for(
 
 
 def test_rounding_is_reported() -> None:
-    card = print_cards([(0.0128853793630525, 0.064)], PARTS)
-    assert card.windows == ((0.01288538, 0.064),)
-    assert ".01288538" in card.notes[0]
-    assert card.notes[0] in card.text
-    assert print_cards([(0.02, 0.09)], PARTS).notes == ()
+    card = print_cards([(1.23456e-5, 0.064)], PARTS)
+    assert card.windows == ((1.2346e-5, 0.064),)
+    assert card.notes[0].startswith("tr = 1.23456e-05 is rounded to 1.2346e-5, ")
+    assert card.notes[0] in " ".join(card.text.replace("$", "").split())
+
+
+@pytest.mark.parametrize("tr", [0.02, 0.0128853793630525, 0.000499539])
+def test_rounding_beyond_the_six_digits_of_all_answers_is_not_reported(
+    tr: float,
+) -> None:
+    card = print_cards([(tr, 0.064)], PARTS)
+    assert card.notes == ()
+    assert f"$ Rigid from {tr:.6g} to 0.064;" in card.text
+    assert f"{card.windows[0][0]:.6g}" == f"{tr:.6g}"
 
 
 def test_warnings_are_those_that_apply() -> None:

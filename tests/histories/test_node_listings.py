@@ -1,4 +1,4 @@
-"""Nodes whose motion LS-DYNA lists in its ASCII database nodout, beside the file with the energies."""
+"""Nodes whose motion LS-DYNA lists in its ASCII database nodout, next to the file with the energies."""
 
 from __future__ import annotations
 

@@ -52,7 +52,7 @@ def test_conventions(name: str) -> None:
 
 
 def walk(energy: list[int], level: int) -> list[tuple[Fraction, bool]]:
-    """Crossings by a walk in rational arithmetic: the same conventions, another way."""
+    """Crossings by a walk in rational arithmetic: the same conventions with another method."""
     passages: list[tuple[Fraction, bool]] = []
     side, arrived = 0, Fraction(0)
     for i, value in enumerate(energy):

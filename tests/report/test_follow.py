@@ -117,7 +117,7 @@ def test_the_end_of_a_run_is_told_once_with_the_next_step(
 def test_a_run_that_is_over_when_first_seen_is_left_to_plan(
     folder: Path, how: str
 ) -> None:
-    """An advice to switch now would come too late, and plan knows the whole flight."""
+    """An advice to switch now would come too late, and plan uses the whole flight."""
     history = folder / "matsum"
     history.write_bytes(Path(MATSUM).read_bytes())
     if how == "listing":

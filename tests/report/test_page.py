@@ -27,7 +27,7 @@ VOID = {"meta", "br", "hr", "link", "input"}
 PAPER = ("--td", "0.064", ENERGY)
 CHAIN = locate_stored("chain_referenceT01.gz")
 BOX = ("--td", "0.37", "--part", "box", "--no-verify", ROLLOVER_T01)
-# Of a command with its arguments: the exit code, what its page says, and what it must not say.
+# For a command with its arguments: the exit code, texts that its page contains, and texts that it must not contain.
 TOLD = {
     "parts, version, flight and health": (
         ("suggest", *BOX), 0,
@@ -539,5 +539,5 @@ def test_a_verdict_tells_health_parts_and_the_switched_run(tmp_path: Path) -> No
         "hourglass energy of box",
         "The window is 0.1 to 0.37",
     )
-    for text in (*texts, "0.66 times that of the reference run"):
+    for text in (*texts, "66% of that of the reference run"):
         assert text in page.text

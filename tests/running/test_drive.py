@@ -88,7 +88,7 @@ def make_driving(folder: Path) -> Driving:
 
 
 def check_finished_run(report: dict[str, Any], folder: Path) -> None:
-    """Check what must hold for every finished run: it is complete, and rigid in the flight only."""
+    """Check what must hold for every finished run: it is complete, and rigid only in the flight."""
     switched = [
         window_row for window_row in report["windows"] if window_row["reason"] is None
     ]
@@ -141,7 +141,7 @@ def test_a_run_is_rigid_in_its_flight_and_comes_to_its_end(
     )  # restart files of the starter, and those that may still be needed
     result = run(*prepare_drive(folder, "--resume", "-q", "-f", "table")).stdout
     assert "switched" in result
-    assert "no level at td is matched" in result
+    assert "tr is not matched to the energy at td" in result
     assert "--resume" in read_refusal(*prepare_drive(folder))
     over = run(*prepare_drive(folder, "--resume"))
     assert (
@@ -243,7 +243,7 @@ def test_a_solver_that_hangs_is_ended_with_its_driver(tmp_path: Path) -> None:
 def test_a_run_goes_back_to_the_last_restart_that_is_whole(
     tmp_path: Path, whole: tuple[Path, dict[str, object]]
 ) -> None:
-    """If restart files are damaged, the run continues from an earlier one, in the end from that of the starter."""
+    """If restart files are damaged, the run continues from an earlier one, if necessary from that of the starter."""
     shutil.copytree(whole[0] / "deck", tmp_path / "deck")
     shutil.copytree(whole[0] / "run", tmp_path / "run")
     journal = tmp_path / "run" / "drive.ndjson"
@@ -574,7 +574,9 @@ def test_what_a_run_lacks_is_told_before_anything_is_computed(
     assert message in read_refusal(*words, *options)
     assert not (tmp_path / "run").exists()
     if "--engine" in options:
-        assert "missing   /no/such/engine" in run(*words, *options, "--dry-run").stdout
+        planned = run(*words, *options, "--dry-run")
+        assert planned.exit_code == 1
+        assert "there is no program '/no/such/engine'" in planned.stdout
     else:
         assert message in read_refusal(*words, *options, "--dry-run")
 

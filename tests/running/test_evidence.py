@@ -1,4 +1,4 @@
-"""Force-free times, and how long they must last, for computed runs and for synthetic ones of known motion."""
+"""Force-free times, and how long they must last, for computed runs and for synthetic ones with known motion."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -147,7 +147,7 @@ def test_flights_begin_and_end_where_info_and_plan_find_them() -> None:
 
 
 def test_a_flight_that_rises_says_when_it_is_level_again() -> None:
-    """The rollover box rises at 1.5 m/s; because it rotates, it lands 6 % before it is level again."""
+    """The rollover box rises at 1.5 m/s; because of its rotation, it lands 6 % before it is level again."""
     rising = open_run([str(ROOT / "sample_data" / "rolloverT01.gz")]).history(
         Selection(parts=("box",))
     )

@@ -1,4 +1,4 @@
-"""Watching a run that has not begun, grows, is cut within a record, goes silent, restarts, or ends."""
+"""Watching a run that has not begun, grows, is cut within a record, becomes silent, restarts, or ends."""
 
 import gzip
 import os
