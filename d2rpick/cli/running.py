@@ -102,9 +102,11 @@ def drive(
         --starter 'starter -i {deck} -np 4' --engine 'mpirun -np 4 engine -i {deck}'
     """
     import signal
+    from functools import partial
     from pathlib import Path
 
     from d2rpick.api.drives import Driving
+    from d2rpick.report.drive import describe_progress
 
     output = output.beside(deck)
     report = (lambda _: None) if output.quiet else tell
@@ -116,7 +118,7 @@ def drive(
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     with (
         driving.driver(resume=resume) as driver,
-        show_progress(driver.progress, quiet=output.quiet),
+        show_progress(partial(describe_progress, driver), quiet=output.quiet),
     ):
         driver.prepare()
         driver.run()

@@ -5,7 +5,8 @@ is written, the contact energy is constant instead.  A flight is seen once this 
 that ends may act again: a car hit a block twice, 14 ms apart (docs/reference/first-run.md).
 
 The end of a push that dies away moves the start of the flight a little later as the flight goes on.  A contact moves it
-past the middle of the flight.
+past the middle of the flight.  Without gravity, the end of a push may look like damping, so the force-free time may
+begin in it.  The flight then begins once the momentum itself is constant.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
     # Returns the gravity between two states, None if another force acts or a support holds parts.
     FindGravity = Callable[["GrowingWitness", int, int], float | None]
 
-# Largest change of a momentum or contact energy that counts as constant, relative to its largest value so far [-].
+# Changes of a momentum or contact energy up to this fraction of its largest value so far are treated as zero [-].
 # CONSTANT is 10 times the error of single-precision sums.
 CONSTANT: Final = 1e-4
 # Time between two tests for a force, as a fraction of the force-free time so far [-].
@@ -40,7 +41,7 @@ _TEST_AGAIN: Final = 0.25
 _MOST_COMPARED: Final = 128
 
 
-class Quiet(NamedTuple):
+class SeenFlight(NamedTuple):
     """A flight, i.e. a period without force that lasted for the required time.
 
     Attributes
@@ -77,14 +78,13 @@ class Quiet(NamedTuple):
 
 
 class _SampledFall(FreeFall):
-    """Comparison of the law of free fall, without loads, with a sample of the states in a long window."""
+    """Comparison of the law of free fall with a sample of the states in a long window; no load passes for damping."""
 
     def _select_states(self, first: int, last: int) -> NDArray[np.intp]:
         count = min(last - first + 1, _MOST_COMPARED)
         return np.linspace(first, last, count).round().astype(np.intp)
 
     def _fitted(self, first: int, last: int) -> tuple[Samples, Samples, float]:
-        # With a greater alpha, the end of a push would pass for damping.
         p, impulse, alpha = super()._fitted(first, last)
         return p, impulse, min(alpha, self.limit_damping(first, last))
 
@@ -100,7 +100,7 @@ class GrowingWitness:
         Numbers in the momenta of the parts that fly together; empty if only the energy of the contacts is written.
     free : list of int
         For each state, the first state of the force-free time that lasts up to it.
-    flights : list of Quiet
+    flights : list of SeenFlight
         Flights so far.
     pauses : list of (float, float)
         Start and end of each force-free time that ended before it was seen as a flight [time].
@@ -111,7 +111,7 @@ class GrowingWitness:
     ) -> None:
         self.members, self.parts = members, parts
         self.free: list[int] = []
-        self.flights: list[Quiet] = []
+        self.flights: list[SeenFlight] = []
         self.pauses: list[tuple[float, float]] = []
         self._columns = GrowingColumn()
         self.time: Samples = self._columns.rows
@@ -223,7 +223,7 @@ class GrowingWitness:
         gravity = find_gravity(self, first, state)
         if gravity is None:
             self._test_again_at = state + 1 + int(_TEST_AGAIN * (state - first))
-            # The end of a push may look like damping.  Then a flight without gravity begins later.
+            # In a flight without gravity, the force-free time may begin in the end of a push.
             first = find_farthest(
                 state, first, lambda earlier: self.is_constant(earlier, state)
             )
@@ -233,7 +233,7 @@ class GrowingWitness:
         if gravity is None:
             return
         self.flights.append(
-            Quiet(
+            SeenFlight(
                 start=float(self.time[first]),
                 seen=float(self.time[state]),
                 end=None,

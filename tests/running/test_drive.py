@@ -21,6 +21,7 @@ from d2rpick.api.arguments import read_windows
 from d2rpick.api.drives import Driving
 from d2rpick.base.errors import D2RPickError
 from d2rpick.histories.opening import open_run
+from d2rpick.report.drive import describe_progress
 from d2rpick.running import engine
 from d2rpick.running.sequence import (
     LOAD,
@@ -394,9 +395,12 @@ def test_how_far_a_run_is_can_be_told_at_any_time(tmp_path: Path) -> None:
         starter=give_solver_command("starter"),
         engine=give_solver_command("engine"),
     ).driver(resume=False) as driver:
-        assert driver.progress(3.4) == "starting ... 3 s"
+        assert describe_progress(driver, 3.4) == "starting ... 3 s"
         driver.at = Order(RIGID, 2, 0.05, 0.2)
-        assert driver.progress(9.0) == f"engine run 2, rigid: 0.05 to 0.2 of {END:g}"
+        assert (
+            describe_progress(driver, 9.0)
+            == f"engine run 2, rigid: 0.05 to 0.2 of {END:g}"
+        )
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,7 @@ from d2rpick.histories.opening import Selection, open_run
 from d2rpick.running.events import find_events, highest_energy
 from d2rpick.running.evidence import GrowingEvidence
 from d2rpick.running.inner_motion import Wait
-from d2rpick.running.witness import Quiet
+from d2rpick.running.witness import SeenFlight
 from tests.command import ROOT
 from tests.energies import require
 from tests.records import cut_history, make_table
@@ -36,9 +36,9 @@ def record(*names: str) -> History:
     )
 
 
-def list_spans(quiet_spans: Sequence[Quiet]) -> NDArray[np.float64]:
+def list_spans(seen_flights: Sequence[SeenFlight]) -> NDArray[np.float64]:
     """Return start and end of each span, NaN if unknown."""
-    return np.array([(span.start, span.end) for span in quiet_spans], np.float64)
+    return np.array([(span.start, span.end) for span in seen_flights], np.float64)
 
 
 @pytest.mark.parametrize(
@@ -62,15 +62,15 @@ def test_flights_of_computed_runs_are_seen_and_gaps_in_the_load_are_not(
     name: str, expected: list[tuple[float, float]]
 ) -> None:
     history = record(name)
-    quiet_spans = take_whole_record(history).flights()
-    assert list_spans(quiet_spans)[: len(expected)] == pytest.approx(
+    seen_flights = take_whole_record(history).flights()
+    assert list_spans(seen_flights)[: len(expected)] == pytest.approx(
         np.array(expected), abs=5e-4
     )
     assert all(
         span.seen - span.start >= span.wait.time and span.left <= 1e-4
-        for span in quiet_spans
+        for span in seen_flights
     )
-    assert all(span.gravity == pytest.approx(9.81, rel=5e-3) for span in quiet_spans)
+    assert all(span.gravity == pytest.approx(9.81, rel=5e-3) for span in seen_flights)
 
 
 def test_a_swing_with_a_push_in_it_makes_no_wait_longer() -> None:
@@ -101,12 +101,12 @@ def test_the_wait_that_was_measured_in_the_car_is_not_refused() -> None:
 @pytest.mark.parametrize("name", [CAR, BOX])
 def test_what_is_seen_rests_on_no_later_state(name: str) -> None:
     history = record(name)
-    quiet_spans = take_whole_record(history).flights()
+    seen_flights = take_whole_record(history).flights()
     for time in history.time[[300, 640, 900]].tolist():
         early = cut_history(history, time)
         early_spans = take_whole_record(early).flights()
         assert [span[:2] for span in early_spans] == [
-            span[:2] for span in quiet_spans if span.seen <= time
+            span[:2] for span in seen_flights if span.seen <= time
         ]
 
 
@@ -118,8 +118,8 @@ def test_a_rigid_leg_shows_its_contact_by_the_model_alone() -> None:
 
 def test_flights_are_seen_before_between_and_in_rigid_legs() -> None:
     switched = record(*(f"drop2_w123_T0{leg}.gz" for leg in (1, 2, 3, 4)))
-    quiet_spans = take_whole_record(switched).flights()
-    assert list_spans(quiet_spans)[:2] == pytest.approx(
+    seen_flights = take_whole_record(switched).flights()
+    assert list_spans(seen_flights)[:2] == pytest.approx(
         np.array([(0.0, 0.2858), (0.3022, 0.3386)]), abs=1e-3
     )
 
