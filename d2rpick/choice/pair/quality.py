@@ -604,12 +604,14 @@ def _list_causes_for_fair(situation: Situation, best: Candidate) -> list[Cause]:
     """Return the causes of the vibration grade "fair"."""
     if best.residual is None:
         return []
+    low = best.residual if best.residual_low is None else best.residual_low
     high = best.residual_high or best.residual
     causes = []
-    if best.residual > MOST_GOOD:
-        worst_text = (
-            f", or {format_residual(high)} at worst" if high > _MOST_HIDDEN else ""
-        )
+    is_vague = high > _MOST_HIDDEN
+    # A residual that is stated above the limit, but may be below it by its band, does not make a pair worse than good.
+    is_wrong = best.residual > MOST_GOOD and (is_vague or low > MOST_GOOD)
+    if is_wrong:
+        worst_text = f", or {format_residual(high)} at worst" if is_vague else ""
         causes.append(
             Cause(
                 f"the vibration after td is wrong by {format_residual(best.residual)}{worst_text}",
@@ -618,7 +620,7 @@ def _list_causes_for_fair(situation: Situation, best: Candidate) -> list[Cause]:
                 kind=f"{_WRONG_BY_MORE} {MOST_GOOD:.0%}",
             )
         )
-    elif high > _MOST_HIDDEN:
+    elif is_vague:
         causes.append(
             Cause(
                 f"the vibration after td may be wrong by up to {format_residual(high)}, because the record may hide a "
@@ -627,7 +629,7 @@ def _list_causes_for_fair(situation: Situation, best: Candidate) -> list[Cause]:
                 kind="the record may hide a further mode",
             )
         )
-    if best.residual <= MOST_GOOD and _is_loose(best):
+    if not is_wrong and _is_loose(best):
         reach = (best.tr_high or best.tr) - best.tr
         causes.append(
             Cause(
