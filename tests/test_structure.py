@@ -299,7 +299,8 @@ def list_loaded(*args: str) -> frozenset[str]:
         timeout=TIME_LIMIT,
     )
     assert result.stdout
-    return frozenset(result.stderr.split())
+    # Notes and the next step come before the modules.
+    return frozenset(result.stderr.splitlines()[-1].split())
 
 
 @cache

@@ -217,7 +217,7 @@ class Cards:
     def _suit_deck(
         self, question: RunQuestion, parts_on_card: Sequence[int]
     ) -> tuple[Printing, tuple[str, ...]]:
-        """Return what the deck of the run requires of a card, and notes on rigid bodies that are missing from the deck.
+        """Return what the deck of the run requires of a card, with notes on rigid bodies that the deck lacks.
 
         ``parts_on_card`` are the parts to switch if the history has no parts.
 

@@ -69,7 +69,7 @@ class Driving:
         self,
         deck: str,
         folder: Path,
-        told: Callable[[str], None],
+        report: Callable[[str], None],
         part: Sequence[str] = (),
         wait: float | None = None,
         margin: float | None = None,
@@ -78,7 +78,7 @@ class Driving:
         engine: str | None = None,
         threads: int = 1,
     ) -> None:
-        self.name, self.folder, self._told = deck, folder, told
+        self.name, self.folder, self._report = deck, folder, report
         self.commands = Commands(starter, engine, threads)
         self.deck = read_driven_deck(
             deck, parse_id_ranges("--part", part) if part else ()
@@ -149,7 +149,7 @@ class Driving:
                     journal,
                     self.limits,
                     self.looks,
-                    self._told,
+                    self._report,
                 )
             except OSError as error:
                 if error.errno not in (errno.ENOSPC, errno.EDQUOT):

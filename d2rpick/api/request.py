@@ -20,6 +20,7 @@ from d2rpick.base.options import (
     make_option_name,
 )
 from d2rpick.choice.options import ChoiceOptions, list_uses
+from d2rpick.choice.pair import grades
 from d2rpick.histories.formats import READERS
 
 if TYPE_CHECKING:
@@ -32,11 +33,8 @@ if TYPE_CHECKING:
     from d2rpick.report.formats import RepeatedQuestion
     from d2rpick.vibration.oscillator import Oscillator
 
-MIN_MEAN_ENERGY: Final = (
-    # Smallest accepted mean energy relative to the reference run; well-switched computed runs kept at least 0.77.
-    0.7
-)
-# Options for reading a history; they exclude parts, which a checked deck defines itself.
+MIN_MEAN_ENERGY: Final = grades.MIN_MEAN_ENERGY
+# Options for reading a history; a deck that is checked defines its parts itself.
 READING: Final = ("input_format", "time", "energy", "part", "flying", "channel")
 _READING_FOR_CARDS: Final = tuple(name for name in READING if name != "part")
 OSCILLATOR: Final = ("stiffness", "mass", "frame_mass", "beta", "alpha", "v0")
@@ -132,7 +130,7 @@ class Request(ChoiceOptions, ReadingOptions):
         "Velocity of the frame at time 0. Nothing else moves at time 0.", TIME, "vz0"
     )
     no_verify: bool = make_option(
-        "Judge by the energy level alone, without an oscillator.",
+        "Judge by the energy level alone, without a vibration model.",
         *("flag",), default=False, instead_of=("stiffness", "fit_window"),
     )  # fmt: skip
     run_folder: str | None = None  # Folder of the run with the files in `history`.
@@ -262,12 +260,16 @@ class Request(ChoiceOptions, ReadingOptions):
             for text in write_option(name, getattr(self, name), many=OPTIONS[name].many)
         )
 
-    def judging(self) -> tuple[str, ...]:
-        """Return the options with which ``card`` and ``check`` use the same history to judge windows."""
+    def checking(self) -> tuple[str, ...]:
+        """Return the options with which ``check`` uses the same history to judge windows."""
         history_options = [
             text for name in self.history for text in ("--history", name)
         ]
-        return (*history_options, *self.asking(JUDGING), *self.asking(("part",)))
+        return (*history_options, *self.asking(JUDGING))
+
+    def judging(self) -> tuple[str, ...]:
+        """Return the options with which ``card`` uses the same history to judge windows."""
+        return (*self.checking(), *self.asking(("part",)))
 
     def repeat(self, *, without: Collection[str] = ()) -> RepeatedQuestion:
         """Return the parts of the command line with which other commands ask about the same run."""
@@ -280,6 +282,7 @@ class Request(ChoiceOptions, ReadingOptions):
             parts=self.asking(("part",)),
             options=self.asking(names),
             judging=(*self.judging(), *self.asking(of_deck)),
+            checking=self.checking(),
             files=self.history,
         )
 

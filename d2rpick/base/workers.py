@@ -108,12 +108,17 @@ class Cores(Farm):
         self._pool = self._new(processes)
         self._is_closed = False
 
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+    def __exit__(self, *exception: object) -> None:
+        """End all processes.
+
+        The thread of the pool is awaited: until Python 3.12, the pool's own handler at exit may use a pipe that this
+        thread is just closing, and prints a traceback.
+        """
         self._is_closed = True
         self._leash.close()
         # After an interrupt, the thread that uses the pool may hold its lock for ever: it waits for a dead process.
-        if kind is not KeyboardInterrupt:
-            self._pool.shutdown(wait=False, cancel_futures=True)
+        if KeyboardInterrupt not in exception:
+            self._pool.shutdown(wait=True, cancel_futures=True)
 
     def answers(
         self, function: Callable[[Item], Result], items: Iterable[Item]

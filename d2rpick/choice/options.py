@@ -117,7 +117,7 @@ class ChoiceOptions:
         metadata=_describe_use(of_cards=True),
     )
     tolerance: float = make_option(
-        "Largest frozen-deformation error, or level error if no oscillator describes the record.",
+        "Largest frozen-deformation error, or level error with the basis energy; no effect with the basis modal.",
         FRACTION,
         "L",
         default=0.2,

@@ -85,7 +85,7 @@ class Overview(NamedTuple):
     source: ``plan`` and ``suggest`` choose from them; they rest on the energy alone if nothing better is written.
     ``health`` is that of the run, with the longest flight as its window; None if there are no energies.  ``unjudged``
     states why no times can be chosen from the run; empty if they can.  ``should_write`` names the output that would
-    show the flights for certain; None if it is written, or there is no state.  ``deck`` is the main deck of the run
+    show the flights of single parts; None if it is written, or there is no state.  ``deck`` is the main deck of the run
     that was used, and ``selection`` the columns and parts that the user chose.  ``rigid`` are the windows in which
     parts are rigid.
     """
@@ -326,7 +326,7 @@ def _name_missing_output(run: OpenedRun) -> str:
                 ", at least columns x_momentum, y_momentum, z_momentum of the model"
             )
         output = f"the solver's own file instead of a table (Radioss: {_RADIOSS}; LS-DYNA: {_LS_DYNA}){momentum}"
-    return f"{output}: only part momenta show for certain when the parts fly"
+    return f"{output}: only part momenta show when single parts fly"
 
 
 def _read_notes(database: Legs) -> tuple[str, ...]:

@@ -193,13 +193,20 @@ class _CommandGroup(Documented, click.Group):
 
 
 def _format_usage_error(error: click.UsageError) -> str:
-    """Return the message of a usage error; if an option is unknown, suggest the options that resemble it most."""
-    if not isinstance(error, click.NoSuchOption) or not error.possibilities:
+    """Return the message of a usage error; for an unknown option, it suggests the options that resemble it most."""
+    if not isinstance(error, click.NoSuchOption):
+        return error.format_message()
+    problem = error.message.rstrip(".")
+    word = error.option_name.lstrip("-")
+    if error.ctx and any(
+        isinstance(parameter, click.Argument) and parameter.name == word
+        for parameter in error.ctx.command.params
+    ):
+        return f"{problem}. Give the {word} by its name alone, without an option"
+    if not error.possibilities:
         return error.format_message()
     if error.option_name == "--tr":
-        return (
-            f"{error.message.rstrip('.')}. d2rpick verify judges a given tr with its td"
-        )
+        return f"{problem}. d2rpick verify judges a given tr with its td"
     import difflib
 
     likeness = {
@@ -209,7 +216,7 @@ def _format_usage_error(error: click.UsageError) -> str:
     best = max(likeness.values())
     nearest = [name for name in likeness if likeness[name] >= best - _LESS_ALIKE]
     names = " or ".join(map(repr, sorted(nearest, key=lambda name: -likeness[name])))
-    return f"{error.message.rstrip('.')}. Did you mean {names}?"
+    return f"{problem}. Did you mean {names}?"
 
 
 def _is_interrupt(error: BaseException | None) -> bool:

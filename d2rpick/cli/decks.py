@@ -12,7 +12,6 @@ from d2rpick.cli import options
 from d2rpick.cli.options import FILES, REFERENCE, RESULT
 from d2rpick.cli.output import (
     Output,
-    encode_text,
     explain_error,
     name_options_and_wrap,
     tell,
@@ -71,12 +70,14 @@ def card(
     run = options.open_judging_run(request)
     output = output.beside(windows, *(run.sources if run else ()))
     judged_card = print_card(times, run, request, cards)
-    history_notes = (
-        judged_card.verdicts[0].situation.history.notes if judged_card.verdicts else ()
-    )
-    output.notes(history_notes, collect_cautions(judged_card))
-    output.notes(judged_card.card.notes, ())
-    output.content(encode_text(judged_card.card.text))
+    question = request.repeat()
+    if judged_card.verdicts:
+        history = judged_card.verdicts[0].situation.history
+        output.notes(history.notes, ())
+        if not history.parts:
+            # The parts are those of the card alone.
+            question = question._replace(parts=())
+    output.card(judged_card, collect_cautions(judged_card), question, request.deck)
     if judged_card.worst:
         settings = judged_card.verdicts[0].situation.settings
         output.finish_by_verdict(judged_card.worst, settings.min_quality)

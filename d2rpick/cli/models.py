@@ -173,9 +173,10 @@ def reproduce(
 ) -> None:
     """Reproduce the published results as figures (svg, png) and tables (csv), section by section.
 
-    For each figure, in the order of the paper, it prints what the paper shows, what is found here, and whether the two
-    agree: yes, in part or no.  Published numbers and reference values follow next to those found here.  The figures of
-    the box (sections 1 and 4) take about a minute.  It runs from a clone of the repository, with its folder validation.
+    For each figure, in the order of the paper, d2rpick prints what the paper shows, what d2rpick computes, and whether
+    the two agree: yes, in part or no.  Published numbers and reference values follow next to the computed values.  The
+    figures of the box (sections 1 and 4) take about a minute.  The command works only in a clone of the repository,
+    because it needs the folder validation.
 
     Examples
     --------

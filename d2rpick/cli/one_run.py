@@ -44,7 +44,6 @@ from d2rpick.report.formats import FORMATS, WrittenDeck, write
 
 if TYPE_CHECKING:
     from d2rpick.api.asked import RunQuestion
-    from d2rpick.api.checking import Findings
     from d2rpick.api.plans import Plan
     from d2rpick.base.errors import Caution
 
@@ -101,6 +100,7 @@ def extract(write_as: str | None, request: Request, output: Output) -> None:
     """
     from d2rpick.api.runs import extract_columns
     from d2rpick.report.history_files import TABLES, choose_history_format, write_table
+    from d2rpick.report.next_step import name_step_after_extract
 
     form = write_as or choose_history_format(output.output_file, TABLES)
     selection = request.selection()
@@ -108,6 +108,8 @@ def extract(write_as: str | None, request: Request, output: Output) -> None:
         table, notes = extract_columns(run.files, selection)
     output.notes(notes, ())
     output.content(write_table(form, table))
+    if output.file:
+        output.next_step(name_step_after_extract(output.file))
 
 
 @options.make_command
@@ -134,8 +136,9 @@ def suggest(
 
     If you omit --td, d2rpick chooses both times, in --td-window or in the longest flight.
 
-    A candidate is a time before td at which the internal energy has the same level as at td.  d2rpick verifies each
-    candidate with the floating oscillator that describes the record.  It recommends the best candidate and a better td.
+    A candidate is a time before td at which the parts have nearly the same deformation as at td.  d2rpick judges each
+    candidate by the vibration model that fits the record.  It recommends the best candidate, and names a better td if
+    there is one.
 
     Examples
     --------
@@ -178,7 +181,7 @@ def suggest(
                 for caution in collect_cautions(judged_card)
                 if caution not in answer.cautions
             ]
-        output.card(judged_card, new_cautions)
+        output.card(judged_card, new_cautions, question.repeated, request.deck)
         decision = judged_card.worst if judged_card else None
     else:
         times = options.write_times(td=td, td_window=td_window)
@@ -237,9 +240,9 @@ def explore(
 ) -> None:
     """Show for each time td to switch back the best tr, the error, and the saving.
 
-    It compares evenly spaced values of td, and every peak of the energy, in --td-window or in the longest flight.  It
-    judges each td as `suggest --td` does.  The table lists the pairs that no other pair beats in both error and rigid
-    time.  d2rpick also names the nearest td with half the error.
+    d2rpick compares evenly spaced values of td, and every peak of the energy, in --td-window or in the longest flight.
+    It judges each td as `suggest --td` does.  The table lists the pairs that no other pair beats in both error and
+    rigid time.  d2rpick also names the nearest td with half the error.
 
     Examples
     --------
@@ -285,7 +288,7 @@ def explore(
 @options.make_click_option(
     "min_mean_energy",
     Option(
-        "Lowest allowed ratio of the mean energy after td to that of the reference run; the highest is as far above 1.",
+        "Smallest allowed mean energy after td, divided by the mean energy of the reference run; the largest is 2 - E.",
         FRACTION,
         "E",
     ),
@@ -328,7 +331,11 @@ def verify(
         answer, lambda: answer.page(options.repeat_command(), request.judging(), cards)
     )
     times = options.write_times(tr=tr, td=td, switched=switched)
-    output.answer(answer, question=question.repeated._replace(times=times))
+    output.answer(
+        answer,
+        question=question.repeated._replace(times=times),
+        page=output.report or "",
+    )
     if answer.switched and answer.switched.objections:
         output.finish_with_failed_comparison()
     _finish_answer(output, question, answer.decision, question.settings.min_quality)
@@ -481,16 +488,21 @@ def plan(
     judged_card = (
         answer.printed(cards, every=every) if form == "card" or write_deck else None
     )
+    checked, passed, written = ("", True, None)
     if judged_card and write_deck:
-        checked, findings = _write_and_check(judged_card, answer, write_deck, output)
-        passed = findings.passed
-        written = WrittenDeck(write_deck, passed, not findings.has_only_infos)
-    else:
-        checked, passed, written = ("", True, None)
+        checked, written = _write_and_check(judged_card, answer, write_deck, output)
+        passed = written.passed
+    elif write_deck:
+        checked = f"no deck was written to {make_printable(write_deck)}, because no window can be used"
     if checked and form != "table":
         click.echo(checked, err=True)
     if form == "card":
-        passed &= output.card(judged_card, _select_new_cautions(judged_card, answer))
+        passed &= output.card(
+            judged_card,
+            _select_new_cautions(judged_card, answer),
+            question.repeated,
+            request.deck,
+        )
     else:
         if judged_card:
             output.notes(judged_card.card.notes, ())
@@ -538,18 +550,20 @@ def _check_deck(request: Request, cards: Cards, form: str, folder: str | None) -
 
 def _write_and_check(
     card: JudgedCard, plan: Plan, folder: str, output: Output
-) -> tuple[str, Findings]:
+) -> tuple[str, WrittenDeck]:
     """Write the copy of the deck and check it against the history.
 
     Returns
     -------
     text : str
         The written files, and below them the output of ``check --history`` for the deck.
-    findings : Findings
-        What the check found.
+    written : WrittenDeck
+        The folder, and whether the check found something.
     """
     from d2rpick.api.plans import write_planned_deck
 
     names, checked = write_planned_deck(plan, card, folder, overwrite=output.overwrite)
     listed = [f"written  {make_printable(name)}" for name in names]
-    return "\n".join([*listed, "", checked.text("table", output.shown())]), checked
+    written = WrittenDeck(folder, checked.passed, not checked.has_only_infos)
+    text = checked.text("table", output.shown(written_deck=written))
+    return "\n".join([*listed, "", text]), written

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from d2rpick.api.request import Request
     from d2rpick.api.runs import Run
     from d2rpick.base.errors import Caution
-    from d2rpick.report.formats import DisplayOptions
+    from d2rpick.report.formats import DisplayOptions, RepeatedQuestion
 
 
 OBJECTION = 1
@@ -258,14 +258,34 @@ class Output:
         else:
             click.echo(content, nl=False)
 
-    def card(self, judged_card: JudgedCard | None, cautions: Iterable[Caution]) -> bool:
-        """Write the card of an answer with its cautions; return False if there is no card or a window is rejected."""
+    def card(
+        self,
+        judged_card: JudgedCard | None,
+        cautions: Iterable[Caution],
+        question: RepeatedQuestion,
+        deck: str | None,
+    ) -> bool:
+        """Write a card with its cautions and the step after it; return False if there is no card or a bad window.
+
+        ``question`` and ``deck`` are those of the next command.
+        """
         if judged_card is None:
             self.content(b"")
             return False
         self.notes(judged_card.card.notes, cautions)
-        self.content(judged_card.card.text.encode())
+        self.content(encode_text(judged_card.card.text))
+        # Imported here to keep start-up fast.
+        from d2rpick.report.next_step import name_step_after_card
+
+        self.next_step(
+            name_step_after_card(judged_card.card, judged_card.worst, question, deck)
+        )
         return judged_card.passed
+
+    def next_step(self, step: str) -> None:
+        """Print on stderr what to do with a result that goes to a file or to another program."""
+        if not self.quiet:
+            tell(f"next: {step}")
 
     def notes(self, notes: Iterable[str], cautions: Iterable[Caution]) -> None:
         """Print the warnings, and notes on what a reader omitted."""

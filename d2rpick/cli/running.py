@@ -102,20 +102,23 @@ def drive(
         --starter 'starter -i {deck} -np 4' --engine 'mpirun -np 4 engine -i {deck}'
     """
     import signal
+    from functools import partial
     from pathlib import Path
 
     from d2rpick.api.drives import Driving
+    from d2rpick.report.drive import describe_progress
 
     output = output.beside(deck)
     report = (lambda _: None) if output.quiet else tell
     driving = Driving(deck, Path(folder), report, **driving_options)
     output.notes(driving.deck.notes, driving.cautions)
     if dry_run:
-        return click.echo("\n".join(_plan(driving)))
+        click.echo("\n".join(_plan(driving)))
+        return output.finish(objection=bool(driving.commands.missing()))
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     with (
         driving.driver(resume=resume) as driver,
-        show_progress(driver.progress, quiet=output.quiet),
+        show_progress(partial(describe_progress, driver), quiet=output.quiet),
     ):
         driver.prepare()
         driver.run()
@@ -129,20 +132,24 @@ def drive(
 def _plan(driving: Driving) -> list[str]:
     import shlex
 
+    from d2rpick.report.parts import format_count
+
     deck = driving.deck
     commands = driving.commands
     bodies = ", ".join(map(str, deck.nodes))
-    parts = "1 part" if len(deck.parts) == 1 else f"{len(deck.parts)} parts"
+    typed = click.get_current_context().meta["d2rpick.command"]
+    again = shlex.join(["d2rpick", *(word for word in typed if word != "--dry-run")])
+    missing = commands.missing()
+    correct = (
+        f"correct --starter or --engine, because there is no program {missing!r}, then "
+    )
     return [
+        f"next      {correct * bool(missing)}start the run with {again}",
         f"copies    {', '.join(deck.files)} to {driving.folder}",
         f"starts    {shlex.join(commands.words('starter', f'{deck.name}_0000.rad'))}",
         f"          {shlex.join(commands.words('engine', f'{deck.name}_0001.rad'))}, and further engine runs",
-        *(
-            [f"missing   {missing}: no such program"]
-            if (missing := commands.missing())
-            else []
-        ),
-        f"switches  {parts} by main node {bodies}, to the end at {deck.end:g}",
+        f"switches  {format_count(len(deck.parts), 'part')} by main node {bodies}",
+        f"ends      at {deck.end:g}",
     ]
 
 
@@ -248,7 +255,7 @@ def first(
     """Write a copy of DECK that switches the parts in its first run, so that no reference run is needed.
 
     The solver makes the parts rigid when no contact force has acted for the time --wait, and deformable at the next
-    force.  For Radioss, the copy contains restart segments that sensors end, and the missing rigid bodies.  For
+    force.  For Radioss, the copy contains engine files whose runs sensors end, and the missing rigid bodies.  For
     LS-DYNA, it contains switches with contact codes.
 
     Examples
@@ -257,6 +264,7 @@ def first(
     d2rpick first --part 1 --wait 0.02 --after 0.05 sample_data/falling_plate/plate_0000.rad -o later/
     """
     from d2rpick.api.running import first as write
+    from d2rpick.report.next_step import name_step_after_first
 
     written_files = write(
         deck,
@@ -267,6 +275,7 @@ def first(
         overwrite=output.overwrite,
     )
     output.notes(written_files.notes, ())
+    click.echo(f"next     {make_printable(name_step_after_first(output_dir))}")
     click.echo(
         "\n".join(f"written  {make_printable(name)}" for name in written_files.files)
     )

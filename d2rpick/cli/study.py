@@ -26,7 +26,7 @@ from d2rpick.cli.options import RESULT, WINDOW
 from d2rpick.cli.output import Output, tell
 from d2rpick.cli.progress import show_counting
 from d2rpick.cli.values import choose_click_type
-from d2rpick.report.formats import FORMATS
+from d2rpick.report.formats import FORMATS, RepeatedQuestion
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -268,4 +268,4 @@ def calibrate(folders: tuple[str, ...], output: Output) -> None:
     output = output.beside()
     answer = fit(folders)
     output.notes((), answer.cautions)
-    output.answer(answer)
+    output.answer(answer, question=RepeatedQuestion(files=folders))

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 # Smallest number of time steps in a rigid window; it must be large, because parts are released up to one step late.
 # Each window has its own time-step limit, so that adding a window does not change the run before it.
-_CAP_SHARE = 1000
+CAP_SHARE = 1000
 _NODES_PER_LINE = 10
 # Largest number of engine runs; the names of time history files contain the number with two digits.
 MOST_LEGS = 99
@@ -30,7 +30,7 @@ class EngineFile(NamedTuple):
 
 def choose_step_cap(tr: float, td: float) -> float:
     """Return the time-step limit while parts are rigid from tr to td [time]."""
-    return float(f"{(td - tr) / _CAP_SHARE:.2g}")
+    return float(f"{(td - tr) / CAP_SHARE:.2g}")
 
 
 def plan_legs(

@@ -52,11 +52,11 @@ _SET_OPTIONS: Final = {"LIST", "TITLE", "COLLECT", "GENERATE", "COLUMN", "ADD"}
 _NODE_SET_OPTIONS: Final = {"LIST", "TITLE", "GENERATE", "COLUMN"}
 # Node sets of each deck that have been read.
 _NODE_SETS: WeakKeyDictionary[Deck, Mapping[int, frozenset[int]]] = WeakKeyDictionary()
-# Nodes of the nodal rigid body to which each node belongs, of each deck that has been read.
+# Nodes of the nodal rigid body to which each node belongs, by deck.
 _NODAL_BODIES: WeakKeyDictionary[Deck, Mapping[int, frozenset[int]]] = (
     WeakKeyDictionary()
 )
-# Solid formulations that keep their stresses in global axes, keyed by ELFORM; 0 and 9 are co-rotational.
+# Solid formulations, by ELFORM, that keep their stresses in global axes; 0 and 9 are co-rotational.
 NOT_TURNED: Final = {
     -2: "8 points, selectively reduced, for poor aspect ratios",
     -1: "8 points, selectively reduced, for poor aspect ratios",
@@ -561,14 +561,28 @@ _CONSTRAINTS: Final[
 }
 
 
-CONSTRAINT_KINDS: Final = tuple(_CONSTRAINTS)
+# Flags of a switching card that delete each kind of constraint (vendor keyword data).
+# No source states which flag deletes extra nodes and joints, so both are listed.
+DELETING_FLAGS: Final[Mapping[Kind, tuple[str, ...]]] = {
+    "nodal rigid body": ("NRBF",),
+    "generalized weld": ("NRBF",),
+    "spotweld": ("NCSF",),
+    "rivet": ("NCSF",),
+    "constrained node set": ("NCSF",),
+    "extra nodes": ("NRBF", "NCSF"),
+    "joint": ("NRBF", "NCSF"),
+}
 
 
 def read_merged_bodies(deck: Deck) -> Iterator[tuple[CardField, frozenset[int]]]:
-    """Yield the place and the two parts of each pair that *CONSTRAINED_RIGID_BODIES merges into one rigid body."""
+    """Yield the place and the two parts of each pair that *CONSTRAINED_RIGID_BODIES merges into one rigid body.
+
+    With the option SET, the second number is a part set, and only the first part is returned.
+    """
     for card in deck.named("CONSTRAINED_RIGID_BODIES"):
+        has_set = "SET" in card.options("CONSTRAINED_RIGID_BODIES")
         for row in card.data:
-            values = card.numbers(row, MERGED_BODIES)
+            values = card.numbers(row, MERGED_BODIES)[: 1 if has_set else 2]
             ids = (
                 value.value + card.transform.part
                 for value in values

@@ -114,6 +114,11 @@ class PrintedCard:
     sensors: Mapping[int, int] = field(default_factory=dict)
     fewest_cycles: int | None = None
 
+    @property
+    def has_engine_files(self) -> bool:
+        """True if the input consists of Radioss engine files, and is not included by a deck."""
+        return any(name.endswith(".rad") for name in self.files)
+
 
 class CardSolver(NamedTuple):
     """A solver whose input d2rpick can print.

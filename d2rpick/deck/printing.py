@@ -16,6 +16,7 @@ from d2rpick.base import __version__
 from d2rpick.base.errors import DeckError
 from d2rpick.deck import printed_card
 from d2rpick.deck.engine_files import (
+    CAP_SHARE,
     choose_step_cap,
     plan_legs,
     write_bodies_off,
@@ -72,8 +73,6 @@ _SEPARATE = (
     "  Give the main deck and a history of these parts (--deck), or merge such",
     "  parts (d2rpick card --merge), never loose ones.",
 )
-_CAPPED = "DTMAX limits the time step, which would grow if no deformable part is left."
-
 _RUN_NAME = re.compile(r"[\w.-]+", re.ASCII)
 _OF_RADIOSS = (
     "Ids are main nodes of /RBODY, not bodies; an unknown one is skipped silently.",
@@ -124,8 +123,9 @@ def _print_ls_dyna(
         for times, pair in zip(windows, texts, strict=True)
         for note in _note_roundings(times, pair)
     )
-    comment_lines = (*notes, *_write_warnings(ids, printing), *write_comments(remarks))
-    spans = ", ".join(f"{tr} to {td}" for tr, td in texts)
+    # The verdict comes first.
+    comment_lines = (*write_comments(remarks), *notes, *_write_warnings(ids, printing))
+    spans = ", ".join(f"{float(tr):.6g} to {float(td):.6g}" for tr, td in texts)
     lines = [
         *write_comments([f"Rigid from {spans}; written by d2rpick {__version__}"]),
         *comment_lines,
@@ -189,10 +189,10 @@ def _print_ls_dyna_contact(
         ),
     )
     comment_lines += (
+        *write_comments(remarks),
         *_write_warnings(ids, printing),
         *_BY_FORCE[:2],
         _OF_OFFSET,
-        *write_comments(remarks),
     )
     lines = [f"$ {line}" for line in comment_lines]
     for members, name in part_sets.items():
@@ -231,11 +231,10 @@ def _check_printed(texts: Sequence[str]) -> None:
 
 
 def _note_roundings(times: Times, texts: tuple[str, str]) -> Iterator[str]:
-    """Yield a note for each time that the card cannot represent exactly."""
+    """Yield a note for each time that a card cannot represent with the six digits that all answers show."""
     for name, value, text in zip(("tr", "td"), times, texts, strict=True):
-        if float(text) != value:
-            error = f"nearest in {LONGEST} characters, error {float(text) - value:+.1e}"
-            yield f"{name} = {value:.12g} is rounded to {text} ({error})."
+        if f"{float(text):.6g}" != f"{value:.6g}":
+            yield f"{name} = {value:.6g} is rounded to {text}, the nearest number in {LONGEST} characters."
 
 
 def _write_warnings(ids: Sequence[int], printing: Printing) -> Iterator[str]:
@@ -248,7 +247,7 @@ def _write_warnings(ids: Sequence[int], printing: Printing) -> Iterator[str]:
         *PHYSICS,
         *(deleted or _LEFT_ACTIVE),
         "Springs and dampers are not switched.",
-        _CAPPED,
+        *write_comments([_explain_step_limit(printing)]),
     )
     if printing.merge is None and printing.bodies:
         yield from (
@@ -260,6 +259,15 @@ def _write_warnings(ids: Sequence[int], printing: Printing) -> Iterator[str]:
         yield from _SEPARATE
     elif printing.merge is not None and printing.merge not in ids:
         yield f"Part {printing.merge} is the lead: it must be rigid already."
+
+
+def _explain_step_limit(printing: Printing) -> str:
+    """Return where the time-step limit of the cards comes from, and why they have one."""
+    if printing.step_cap is None:
+        source = f"1/{CAP_SHARE} of the rigid time (--step-cap sets another limit)"
+    else:
+        source = "the given --step-cap"
+    return f"DTMAX is {source}: without it, the time step grows if no deformable part is left."
 
 
 def _print_radioss(
@@ -283,7 +291,7 @@ def _print_radioss(
         + "\n"
         for leg in plan_legs(windows, end, printing.step_cap)
     }
-    return _combine_card(windows, printing, (*_OF_RADIOSS, *remarks), files)
+    return _combine_card(windows, printing, (*remarks, *_OF_RADIOSS), files)
 
 
 def _print_radioss_sensors(
@@ -336,7 +344,7 @@ def _print_radioss_contact(
     )
     force = (kind, number, timing.wait)
     sensors = _write_sensors(spans, printing.sensor, force)
-    return _print_sensors(timing.windows, printing, sensors, (*explanation, *remarks))
+    return _print_sensors(timing.windows, printing, sensors, (*remarks, *explanation))
 
 
 def _find_force(printing: Printing) -> tuple[str, int, Pushes]:
@@ -404,7 +412,7 @@ def _print_sensors(
     card = _combine_card(
         tuple(windows),
         printing,
-        (*_OF_SENSORS, *instructions, *remarks),
+        (*remarks, *_OF_SENSORS, *instructions),
         files,
         texts,
     )
@@ -473,9 +481,9 @@ def _combine_card(
     further_cards: str = "",
 ) -> PrintedCard:
     """Combine comments, cards for the starter deck and engine files into a card."""
-    spans = ", ".join(f"{tr!r} to {td!r}" for tr, td in windows)
+    spans = ", ".join(f"{tr:.6g} to {td:.6g}" for tr, td in windows)
     head = write_comments(
-        [f"Rigid from {spans}; written by d2rpick {__version__}", *PHYSICS, *remarks]
+        [f"Rigid from {spans}; written by d2rpick {__version__}", *remarks, *PHYSICS]
     )
     text = "".join(f"# {line}\n" for line in head)
     starter = printing.starter + further_cards

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.deck.ls_dyna_parts import (
+    DELETING_FLAGS,
     Constraint,
     find_element_cards,
     read_constraints,
@@ -54,14 +55,9 @@ def find_suiting(path: str, parts: Collection[int]) -> Suiting:
             "radioss", find_name_of_files(run), legs[-1].stop.value if has_end else None
         )
     deck = read_deck(path)
-    bodies = [*read_constraints(deck, "nodal rigid body", "generalized weld")]
-    further = [
-        *read_constraints(
-            deck, "extra nodes", "joint", "spotweld", "rivet", "constrained node set"
-        )
-    ]
     nodal, by_set = (
-        _is_on_parts(constraints, parts, deck) for constraints in (bodies, further)
+        _is_on_parts(_read_deleted(deck, flag), parts, deck)
+        for flag in ("NRBF", "NCSF")
     )
     return Suiting("ls-dyna", None, None, _find_free_ids(deck), nodal, by_set)
 
@@ -86,6 +82,12 @@ def _find_free_ids(deck: Deck) -> tuple[int, int]:
     highest = max((*sets, *read_parts(deck).sets), default=0)
     first = max(_FIRST, highest + 1)
     return first, first + 1
+
+
+def _read_deleted(deck: Deck, flag: str) -> list[Constraint]:
+    """Return the constraints that a flag deletes; for joints and extra nodes, which either may delete, NCSF is used."""
+    kinds = (kind for kind, flags in DELETING_FLAGS.items() if flags[-1] == flag)
+    return [*read_constraints(deck, *kinds)]
 
 
 def _is_on_parts(

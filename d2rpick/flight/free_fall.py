@@ -103,12 +103,12 @@ class Laws:
             return window, gravity
         window = self._lasting(self._steady, td)
         if window:
-            return (None if self._carried else window), None
+            return (None if self.is_carried else window), None
         window = self._lasting(self._steady, td, self._enough)
         if (
             window and not self._falls_across
         ):  # A push that briefly balances the weight keeps the momentum constant, too.
-            return (None if self._carried else window), None
+            return (None if self.is_carried else window), None
         return self._under_gravity(td)
 
     def gravity(self, first: int, last: int) -> float | None:
@@ -127,7 +127,7 @@ class Laws:
         )
 
     @property
-    def _carried(self) -> bool:
+    def is_carried(self) -> bool:
         """Return True if the parts must be held by a support whenever no force on them is visible."""
         return self.fall if self.gravities is None else 0.0 not in self.gravities
 
@@ -148,7 +148,7 @@ class Laws:
         )
         length = float(self.fit.time[last] - self.fit.time[first])
         damping = self.fit.damping(first, last)
-        return damping * length > max(_DAMPED, _SHOWN * (last - first)) or (
+        return damping > self.fit.limit_damping(first, last) or (
             final_size < _LEFT * largest and damping * length > _DAMPED
         )
 
@@ -254,7 +254,7 @@ class Laws:
         force = float(np.linalg.norm(vector))
         mass = self.mass if self.mass > 0 else float("nan")
         if force * (end - start) <= _UNSEEN * (TOLERANCE * self.extent + self.noise):
-            return None if self._carried else 0.0
+            return None if self.is_carried else 0.0
         if self._is_gravity(
             force / mass,
             _ALIKE + _REACH_OF_DIGITS * self.noise / (force * (end - start)),
@@ -458,6 +458,11 @@ class FreeFall(Law):
     def damping(self, first: int, last: int) -> float:
         """Return the least-squares damping rate alpha between two states [1/time]."""
         return self._fitted(first, last)[2]
+
+    def limit_damping(self, first: int, last: int) -> float:
+        """Return the largest alpha between two states that is damping [1/time]; a load slows the parts down more."""
+        length = float(self.time[last] - self.time[first])
+        return max(_DAMPED, _SHOWN * (last - first)) / length
 
     def gravity(self, first: int = 0, last: int = -1) -> Samples:
         """Return the gravity fitted between two states (default: all states), shape (components,) [momentum/time]."""

@@ -44,6 +44,7 @@ _BEFORE: Final = (
 _SHORT: Final = 7  # Number of digits of an abbreviated commit hash.
 
 WITH_AN_ERROR: Final = "with an error"
+_PACKED: Final = "normally: its history is packed"
 # Texts at the end of Radioss' engine listing and of LS-DYNA's messag and d3hsp.
 _ENDINGS: Final = {
     b"ERROR TERMINATION": WITH_AN_ERROR,
@@ -94,12 +95,15 @@ def find_wrong_energies(histories: Iterable[str]) -> Iterator[str]:
 
 
 def find_ending(history: str) -> str | None:
-    """Return how a run ended according to the listing next to its last history; None if it is unknown.
+    """Return how a run ended according to its last history and the listing next to it; None if it is unknown.
 
-    A restart segment that was told to stop has not ended the run, nor has one that another segment follows.
+    A packed history belongs to a run that has ended.  A restart segment that was told to stop has not ended the run,
+    nor has one that another segment follows.
     """
     from pathlib import Path  # Imported here to keep start-up fast.
 
+    if history.endswith(".gz"):
+        return _PACKED
     match = re.fullmatch(_HISTORY, history)
     if match is None:
         listings = [str(Path(history).parent / name) for name in ("messag", "d3hsp")]

@@ -423,11 +423,9 @@ class Roots(NamedTuple):
 
 
 def narrow_brackets(
-    inside: Callable[[Samples], Samples],
+    inside: Callable[[Samples], tuple[Samples, Samples]],
     within: Samples,
     beyond: Samples,
-    *,
-    slope: Callable[[Samples], Samples],
     steps: int = HALVINGS,
 ) -> Roots:
     """Narrow the brackets around the roots at which ``inside`` changes from positive to non-positive.
@@ -435,31 +433,29 @@ def narrow_brackets(
     Parameters
     ----------
     inside : callable
-        Positive at ``within`` and not at ``beyond``, an array for an array.
+        Returns values and their slopes, arrays for an array; the values are positive at ``within`` and not at
+        ``beyond``.  Newton steps are used if they stay within their bracket, and each root stays once it has converged,
+        so that it does not depend on the other roots searched with it.
     within, beyond : array
         Ends of the brackets, in either order.
-    slope : callable
-        Derivative of ``inside``: Newton steps are used if they stay within their bracket, and each root stays once it
-        has converged, so that it does not depend on the other roots searched with it.
     steps : int
         Largest number of steps.
 
     Examples
     --------
-    >>> found = narrow_brackets(lambda t: 2 - t**2, np.array([0.0]), np.array([2.0]), slope=lambda t: -2 * t)
+    >>> found = narrow_brackets(lambda t: (2 - t**2, -2 * t), np.array([0.0]), np.array([2.0]))
     >>> f"{found.at[0]:.12f}"
     '1.414213562373'
     """
     at = (within + beyond) / 2
     still = np.zeros(np.shape(within), dtype=bool)
     for _ in range(steps):
-        value = inside(at)
+        value, slope = inside(at)
         good = value > 0
         within = np.where(good, at, within)
         beyond = np.where(good, beyond, at)
         following = (within + beyond) / 2
-        rise = slope(at)
-        newton = at - value / np.where(rise == 0, np.inf, rise)
+        newton = at - value / np.where(slope == 0, np.inf, slope)
         inner = (newton >= np.minimum(within, beyond)) & (
             newton <= np.maximum(within, beyond)
         )

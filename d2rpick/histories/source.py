@@ -207,6 +207,10 @@ def _list_later_files(name: str) -> Sequence[str]:
     return [os.path.join(folder, sibling) for sibling in in_order]  # noqa: PTH118  pathlib would slow down start-up
 
 
+# Suffixes of decks, which show that the solver has not been run yet.
+_DECKS: Final = (".k", ".key", ".dyn", ".rad")
+
+
 def _list_databases(folder: Path) -> list[str]:
     """Return the solver databases in a folder; raise FormatError unless all belong to one run."""
     runs_of_files = {file: _find_run(file) for file in sorted(folder.iterdir())}
@@ -214,6 +218,9 @@ def _list_databases(folder: Path) -> list[str]:
     if not databases:
         inner = any(map(_find_run, folder.glob("*/*")))
         cure = "give the file"
+        decks = [file.name for file in runs_of_files if file.suffix in _DECKS]
+        if decks:
+            cure = f"it contains the deck {decks[0]}: run it, or give the files that the solver wrote"
         if inner:
             cure = f"its folders are runs: give one, or all to study as '{folder}/*'"
         raise FormatError(
@@ -303,9 +310,12 @@ def _suggest_file(name: str) -> str:
     seconds = parse_seconds(name)
     if seconds is not None or re.fullmatch(_NUMBER, name):
         value = "" if seconds is None else f", {seconds:g} if that unit is s"
-        return (
+        hint = (
             f", and a time is given as `td`, a number in the unit of the record{value}"
         )
+        if name.isdecimal():
+            hint += "; several parts are separated by commas, as in `parts` 1,2"
+        return hint
     folder, wanted = os.path.split(name)
     try:
         siblings = os.listdir(folder or ".")  # noqa: PTH208  pathlib would slow down start-up

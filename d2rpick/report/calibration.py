@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from d2rpick.base.errors import make_printable
-from d2rpick.choice.parts.cost import MEASURED, format_weights_as_toml
+from d2rpick.base.errors import list_names, make_printable
+from d2rpick.choice.pair.grades import USE, USE_WITH_CARE
+from d2rpick.choice.parts.cost import MEASURED, POINT, format_weights_as_toml
 from d2rpick.report import keys, tables
 from d2rpick.report.fields import Document, Field, each, many, row
+from d2rpick.report.next_step import write_command
 
 if TYPE_CHECKING:
     from d2rpick.choice.parts.calibration import FittedWeights
-    from d2rpick.report.formats import DisplayOptions
+    from d2rpick.report.formats import DisplayOptions, RepeatedQuestion
 
 _LEG: Final = row(
     Field("name", "text"),
@@ -30,15 +32,22 @@ DOCUMENT: Final = Document("d2rpick/calibrate/1", "Answer of d2rpick calibrate; 
     Field("misfit", "number"),
     Field("legs", many(_LEG)),
 ), closed=True)  # fmt: skip
-HEAD = ("formulation", "weight", "built-in weight", "source")
+HEAD = ("formulation", "weight [us]", "built-in [us]", "source")
 COLUMNS = ("formulation", "weight", "measured", "told")
-LEG_HEAD = ("leg", "step", "elements", "rigid nodes")
+LEG_HEAD = ("run", "CPU time of a step", "of the elements", "rigid nodes")
+# Largest misfit of weights that need no caution [-]: twice the error that the fit assumes for CPU times.
+_SMALL_MISFIT: Final = 0.1
+# Names of formulations that the solvers do not have.
+_IN_WORDS: Final = {POINT: "integration point"}
+# File for the weights in the next command.
+_FILE: Final = "weights.toml"
 
 
 def as_table(calibration: FittedWeights, display: DisplayOptions) -> str:
     """Return a table of each formulation's assumed and fitted weight, and a table of the restart segments used."""
     weights = calibration.weights
     lines = [
+        *tables.format_in_line(list_verdict_lines(calibration, display.question)), "",
         tables.as_text(HEAD, _list_weight_rows(calibration), display.width), "",
         f"fraction of a time step spent on elements  {weights.element_share:.3f}",
         f"cost per node of a rigid body              {weights.rigid_node:.3g} us",
@@ -48,10 +57,39 @@ def as_table(calibration: FittedWeights, display: DisplayOptions) -> str:
     return "\n".join(lines)
 
 
-def as_markdown(calibration: FittedWeights, _: DisplayOptions) -> str:
-    """Return the weights and the restart segments as Markdown tables."""
+def list_verdict_lines(
+    calibration: FittedWeights, question: RepeatedQuestion
+) -> list[tuple[str, str]]:
+    """Return whether to use the weights, why, and the command that writes them, as (name, sentence) pairs."""
+    misfit = calibration.misfit
+    verdict = USE if misfit <= _SMALL_MISFIT else USE_WITH_CARE
+    runs = len(calibration.legs)
+    counted = f"{runs} engine run{'s' * (runs != 1)}"
+    lines = [
+        (verdict, f"weights that fit the CPU time of {counted} within {misfit:.1%}")
+    ]
+    built_in = [
+        _IN_WORDS.get(name, name)
+        for name in calibration.weights.per_element
+        if name not in calibration.told
+    ]
+    if len(built_in) > 1:
+        ratio = f"the ratios of {list_names(built_in)} are the built-in ones"
+        lines.append(("why", f"{ratio}, because these runs do not distinguish them"))
+    if verdict != USE:
+        cure = "repeat the runs, each alone on the machine, or give more runs"
+        lines.append(("to improve", cure))
+    line = write_command(question, "calibrate", "-f", "toml", "-o", _FILE)
+    step = f"write the weights with {line}, then give plan or parts --weights {_FILE}"
+    return [*lines, ("next", step)]
+
+
+def as_markdown(calibration: FittedWeights, display: DisplayOptions) -> str:
+    """Return whether to use the weights, and the weights and the restart segments as Markdown tables."""
+    verdict_lines = list_verdict_lines(calibration, display.question)
     return "\n\n".join(
         [
+            *tables.format_as_list(verdict_lines),
             tables.as_markdown(HEAD, _list_weight_rows(calibration)),
             tables.as_markdown(LEG_HEAD, _list_leg_rows(calibration)),
         ]
@@ -79,10 +117,10 @@ def list_plain_rows(calibration: FittedWeights) -> list[list[tables.Cell]]:
 def _list_weight_rows(calibration: FittedWeights) -> list[list[tables.Cell]]:
     return [
         [
-            name,
+            _IN_WORDS.get(name, name),
             f"{weight:.3g}",
             f"{MEASURED[name]:.3g}",
-            "these engine runs" if name in calibration.told else "ratio as measured",
+            "these runs" if name in calibration.told else "built-in ratio",
         ]
         for name, weight in calibration.weights.per_element.items()
     ]

@@ -25,7 +25,9 @@ def list_verdict_lines(decision: Decision, tr: float, td: float) -> Lines:
     ]
     if decision.cure:
         lines.append(("to improve", decision.cure))
-    return [*lines, ("expect", describe_expectation(decision))]
+    # Once a switched run was compared, the screen also shows the measured values.
+    name = "predicted" if decision.is_compared else "expect"
+    return [*lines, (name, describe_expectation(decision))]
 
 
 def describe_expectation(decision: Decision) -> str:
@@ -98,10 +100,12 @@ def list_numbered_reasons(numbers: Mapping[str, int]) -> Lines:
 
 
 def format_in_full(decision: Decision) -> str:
-    """Return the verdict, the reason why it is not better, and what would improve it."""
+    """Return the verdict, the reason why it is not better, what would improve it, and what to expect after td."""
+    verdict = f"{decision.verdict}: {decision.reason}"
+    expectation = f"Expect: {describe_expectation(decision)}"
     if decision.grade == GOOD:
-        return f"{decision.verdict}: {decision.reason}"
-    return f"{decision.verdict}: {decision.reason}. To improve: {decision.cure}"
+        return f"{verdict}. {expectation}"
+    return f"{verdict}. To improve: {decision.cure}. {expectation}"
 
 
 def format_rigid_time(best: Candidate) -> str:

@@ -1,15 +1,16 @@
-"""Write the result of ``drive`` as a table and JSON."""
+"""Describe the progress of ``drive``, and write its result as a table and JSON."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
+from d2rpick.choice.pair.grades import USE, USE_WITH_CARE
 from d2rpick.report import keys, tables
 from d2rpick.report.fields import Document, Field, many, row
 
 if TYPE_CHECKING:
     from d2rpick.report.formats import DisplayOptions
-    from d2rpick.running.drive import Driven
+    from d2rpick.running.drive import Driven, Driver
 
 _WINDOW: Final = row(
     Field("free", "number", "time from which no force acts"),
@@ -33,20 +34,51 @@ DOCUMENT: Final = Document("d2rpick/drive/1", "Answer of d2rpick drive; times in
     Field("saved_by_time", "number?", "saved fraction according to the CPU times of the engine runs",
           lambda answer: answer.saved[1]),
 ))  # fmt: skip
-_NOT_KNOWN: Final = "without a reference no level at td is matched: what keeps of the vibration is an expectation"
+_NOT_KNOWN: Final = (
+    "without a reference run, tr is not matched to the energy at td, so the vibration after td may be "
+    "wrong"
+)
+
+
+def describe_progress(driver: Driver, seconds: float) -> str:
+    """Describe the engine run being computed, or how many ``seconds`` the starter has run before the first one."""
+    order = driver.at
+    if order is None:
+        return f"starting ... {seconds:.0f} s"
+    end = driver.limits.end
+    return f"engine run {order.number}, {order.kind}: {order.start:.6g} to {order.until:.6g} of {end:g}"
 
 
 def as_table(answer: Driven, display: DisplayOptions) -> str:
     """Return the rigid windows, the CPU time of the restart segments, and the savings as text."""
     parts = [
+        "\n".join(tables.format_in_line(list_verdict_lines(answer))),
         tables.as_text(*list_window_rows(answer), display.width)
         if answer.windows
         else "no window",
         tables.as_text(*list_leg_rows(answer), display.width),
     ]
-    return "\n\n".join(
-        [*parts, "\n".join(tables.format_in_line(list_savings(answer), 9))]
-    )
+    remarks = tables.format_in_line(list_savings(answer), 9)
+    return "\n\n".join([*parts, *(["\n".join(remarks)] if remarks else [])])
+
+
+def list_verdict_lines(answer: Driven) -> list[tuple[str, str]]:
+    """Return how to use the run, why, and how to look at its flights, as (name, sentence) pairs."""
+    files = tables.make_positional([str(answer.run.sources[0])])
+    switched_count = sum(not window.reason for window in answer.windows)
+    if not switched_count:
+        plan = tables.quote_shell_line(("d2rpick", "plan", *files))
+        return [
+            (USE, "the run as a reference run, because no part was switched"),
+            ("next", f"choose times with {plan}"),
+        ]
+    info = tables.quote_shell_line(("d2rpick", "info", *files))
+    flights = f"{switched_count} of {len(answer.windows)} flights"
+    return [
+        (USE_WITH_CARE, f"the run, whose parts were rigid in {flights}"),
+        ("why", _NOT_KNOWN),
+        ("next", f"look at the flights and the health of the run with {info}"),
+    ]
 
 
 def list_window_rows(answer: Driven) -> tuple[list[str], list[list[tables.Cell]]]:
@@ -110,8 +142,4 @@ def list_savings(answer: Driven) -> list[tuple[str, str]]:
         for caution in answer.cautions
         if caution.code == "out-of-place"
     ]
-    return [
-        *lines,
-        *([("wait", answer.why)] if answer.why else []),
-        ("keeps", _NOT_KNOWN),
-    ]
+    return [*lines, *([("wait", answer.why)] if answer.why else [])]

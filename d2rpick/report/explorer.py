@@ -302,7 +302,7 @@ def _round_number(value: float | None) -> float | None:
 def _name_error(offers: Sequence[Offer]) -> str:
     """Return the name of the error by which the proposed pairs are compared."""
     if all(offer.basis == "energy" for offer in offers):
-        return "shortfall of the level at td"
+        return "level shortfall"
     return "residual"
 
 

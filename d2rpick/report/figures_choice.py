@@ -97,8 +97,8 @@ _MOST_PARTS: Final = 6
 _TRADE_HEIGHT, _TRADE_PANEL = 7.0, 1.9
 # Space before the first and after the last td, as a fraction of the axes [-], in which their marks fit.
 _AT_EDGE: Final = 0.02
-_ERRORS: Final = {True: "shortfall of the level", False: "residual"}
-# Palette of Okabe and Ito without yellow, which is hard to see on white. Dashes distinguish lines of equal colour.
+_ERRORS: Final = {True: "level shortfall", False: "residual"}
+# Palette of Okabe and Ito without yellow, which is hard to see on white. Dashes distinguish lines of the same colour.
 _RUN_COLOURS: Final = (
     REFERENCE,
     SWITCHED,

@@ -52,6 +52,8 @@ _NOUNS: Final = (
     "info message",
 )  # Nouns for the severities error, warning and info.
 # This pattern is compiled at its first use, to keep start-up fast.
+# Name of the switched run in a command if the user has to give it.
+_SOME_RUN: Final = "SWITCHED_RUN"
 _NOT_XML: Final = "[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]"
 
 _LINE: Final = get_kind("integer", minimum=1)
@@ -98,8 +100,11 @@ class Checks:
     fail_on: Severity = Severity.ERROR
 
 
-def as_table(checks: Checks, _: DisplayOptions) -> str:
-    """Return a line per finding and per window of each deck, the numbers of findings and decks, and the next step."""
+def as_table(checks: Checks, display: DisplayOptions) -> str:
+    """Return one line per finding and per window of each deck, the numbers of findings and decks, and the next step.
+
+    Below a plan with which the deck was written, the plan gives the next step.
+    """
     lines: list[str] = []
     for result in checks.results:
         lines.append(_format_path(result.deck, checks.root))
@@ -116,9 +121,9 @@ def as_table(checks: Checks, _: DisplayOptions) -> str:
             f"  {_format_finding(finding)}"
             for finding in _list_findings(checks, result)
         ]
-    step = f"next  {_name_next_step(checks)}"
+    step = [] if display.written_deck else [f"next  {_name_next_step(checks)}"]
     return "\n".join(
-        [*map(make_printable, lines), "", step, _summarize_findings(checks)]
+        [*map(make_printable, lines), "", *step, _summarize_findings(checks)]
     )
 
 
@@ -162,8 +167,15 @@ def _name_next_step(checks: Checks) -> str:
     if POOR in grades:
         plan = tables.quote_shell_line(("d2rpick", "plan", *history))
         return f"choose other times with {plan}"
-    compare = tables.quote_shell_line(history)
-    return f"run the deck, and compare the run with d2rpick verify --switched SWITCHED_RUN {compare}"
+    folders = {os.path.dirname(result.deck) for result in checks.results}  # noqa: PTH120  as above
+    of_history = {os.path.dirname(file) for file in checks.history}  # noqa: PTH120  as above
+    # A run in the folder of the deck leaves its results there, unless this folder already contains the reference run.
+    runs = [] if folders & of_history else [folder or os.curdir for folder in folders]
+    switched = tables.make_positional(runs[:1] or [_SOME_RUN])
+    line = tables.quote_shell_line(
+        ("d2rpick", "verify", "--switched", *switched, *history)
+    )
+    return f"run the deck, and compare the run with {line}"
 
 
 def as_ndjson(checks: Checks, display: DisplayOptions) -> str:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from d2rpick.running.events import RunEvent
     from d2rpick.running.inner_motion import Wait
-    from d2rpick.running.witness import Quiet
+    from d2rpick.running.witness import SeenFlight
 
 # Messages of events that are always the same.
 _MESSAGES: Final = {
@@ -119,7 +119,7 @@ def _describe_event(event: RunEvent, *, is_past: bool) -> Event:
     return Event(event.event, event.time, event.seen, message, wait, left, event.tr)
 
 
-def _describe_flight(flight: Quiet) -> str:
+def _describe_flight(flight: SeenFlight) -> str:
     """Report that a flight was detected, which evidence shows it, and why it was not detected earlier."""
     landing = "landing time unknown"
     if flight.level is not None:
@@ -134,7 +134,7 @@ def _describe_advice(event: RunEvent, wait: Wait) -> str:
     """Advise when to switch, and give the reason."""
     if wait.source == "at-rest":
         return "switch now: nothing vibrates, so any tr is right, and the earliest keeps the parts rigid for longest"
-    warning = f"; {event.swing.told}" if event.swing else ""
+    warning = f"; {event.swing.warning}" if event.swing else ""
     if event.energy is None:
         return (
             f"the internal energy was highest at {event.time:.6g}: restart from an earlier state to switch there"

@@ -58,6 +58,8 @@ class RepeatedQuestion(NamedTuple):
         All other options that select and judge the run.
     judging : tuple of str
         All options and files by which ``card`` judges in the same way.
+    checking : tuple of str
+        All options and files by which ``check`` judges in the same way.
     files : tuple of str
         Files of the history.
     card : tuple of str
@@ -68,6 +70,7 @@ class RepeatedQuestion(NamedTuple):
     parts: tuple[str, ...] = ()
     options: tuple[str, ...] = ()
     judging: tuple[str, ...] = ()
+    checking: tuple[str, ...] = ()
     files: tuple[str, ...] = ()
     card: tuple[str, ...] = ()
 
@@ -77,7 +80,8 @@ class DisplayOptions(NamedTuple):
 
     With ``every``, all windows of a plan are shown, not only the supported ones; with ``verbose``, all details.  Tables
     and text are no wider than ``width`` columns.  ``written_deck`` is the deck that was written with the answer.
-    ``question`` has the words with which the next command asks about the same run.
+    ``question`` has the words with which the next command asks about the same run.  ``page`` is the name of the HTML
+    page that was written with the answer, if any.
     """
 
     command: Sequence[str] = ()
@@ -88,6 +92,7 @@ class DisplayOptions(NamedTuple):
     width: int = WIDEST
     written_deck: WrittenDeck | None = None
     question: RepeatedQuestion = RepeatedQuestion()
+    page: str = ""
 
 
 def write(result: str, form: str, answer: Any, display: DisplayOptions) -> str:

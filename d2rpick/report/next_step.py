@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
+from d2rpick.choice.pair.grades import DO_NOT_USE
 from d2rpick.report.tables import make_positional, quote_shell_line
 
 if TYPE_CHECKING:
@@ -13,6 +14,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.pair.decision import Decision
     from d2rpick.choice.pair.situation import Situation
     from d2rpick.choice.question import Settings
+    from d2rpick.deck.printed_card import PrintedCard
     from d2rpick.histories.history import History
     from d2rpick.report.formats import RepeatedQuestion
 
@@ -175,3 +177,36 @@ def name_step_after_refusal(
         )
         return f"judge the parts that vibrate together with {line}"
     return otherwise
+
+
+def name_step_after_card(
+    card: PrintedCard,
+    worst: Decision | None,
+    question: RepeatedQuestion,
+    deck: str | None,
+) -> str:
+    """Return the step after a card: the check of the ``deck`` with it, or other times if the ``worst`` pair is poor."""
+    if worst is not None and worst.verdict == DO_NOT_USE:
+        return f"choose other times with {write_command(question, 'suggest')}"
+    if card.has_engine_files:
+        action, name = "put these files next to the starter deck", "starter deck"
+    else:
+        action, name = "add these cards to the main deck", "main deck"
+    hint = "" if deck else f" ({name} instead of {_SOME_DECK})"
+    files = make_positional([deck or _SOME_DECK])
+    line = quote_shell_line(("d2rpick", "check", *question.checking, *files))
+    return f"{action}, then check it with {line}{hint}"
+
+
+def name_step_after_extract(file: str) -> str:
+    """Return the step after the extraction of an energy into a file."""
+    line = quote_shell_line(("d2rpick", "suggest", *make_positional([file])))
+    return f"choose times with {line}"
+
+
+def name_step_after_first(folder: str) -> str:
+    """Return the step after a deck that switches itself was written into a folder."""
+    files = make_positional([folder])
+    check = quote_shell_line(("d2rpick", "check", *files))
+    follow = quote_shell_line(("d2rpick", "follow", *files))
+    return f"check the deck with {check}, and run it; {follow} shows meanwhile when the parts fly and are rigid"

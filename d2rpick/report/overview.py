@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import list_names, make_printable
-from d2rpick.choice.pair.grades import DO_NOT_USE
+from d2rpick.choice.pair.grades import DO_NOT_USE, USE, USE_WITH_CARE
 from d2rpick.flight import SOURCES
 from d2rpick.report import keys, tables
 from d2rpick.report.fields import Document, Field, get_kind, many, maybe, one_of, row
@@ -79,7 +79,7 @@ DOCUMENT: Final = Document("d2rpick/info/1", "Answer of d2rpick info; times in t
     Field("parts", many(_PART)),
     Field("flights", many(_FLIGHT), "free flights, found from the best evidence in the files"),
     Field("should_write", "text?",
-          "output to request so that the flights are certain; null if the files contain it"),
+          "output to request so that the flights of single parts are known; null if the files contain it"),
     keys.HEALTH,
     Field("notes", "texts"),
     Field("verdict", keys.VERDICT, "whether this run is suitable for choosing switch times", later=True),
@@ -89,6 +89,12 @@ DOCUMENT: Final = Document("d2rpick/info/1", "Answer of d2rpick info; times in t
 # Largest number of contact times that are listed if a contact acts often.
 _MOST_TIMES: Final = 4
 _PARTS_HEAD = ("part", "title", "highest internal energy")
+# What to do with the record; the verdict of a pair has the same words, so the sentence names the record.
+_RECORD: Final = {
+    USE: "use it to choose times",
+    USE_WITH_CARE: "use it with care to choose times",
+    DO_NOT_USE: "do not use it to choose times",
+}
 # Keys of the JSON output whose value is neither a list nor an object.
 _PLAIN = (
     "format",
@@ -126,7 +132,7 @@ def as_table(overview: Overview, display: DisplayOptions) -> str:
 
 def list_overview_lines(overview: Overview) -> list[tuple[str, str]]:
     """Return whether the run can be used, why, its flights, and the next command, as (name, sentence) pairs."""
-    lines = [("verdict", overview.verdict), ("why", overview.reason)]
+    lines = [("record", _RECORD[overview.verdict]), ("why", overview.reason)]
     lines += [("flight", _format_flight(*flight)) for flight in overview.flights]
     if overview.verdict == DO_NOT_USE:
         is_known = overview.unjudged or overview.rigid

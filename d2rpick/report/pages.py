@@ -625,7 +625,9 @@ def drive_page(answer: Driven, command: Sequence[str]) -> str:
         page.build_front(
             cards,
             build_remarks(answer.cautions),
-            build_pairs(drive.list_savings(answer)),
+            build_pairs(
+                [*drive.list_verdict_lines(answer), *drive.list_savings(answer)]
+            ),
         ),
         _build_figure("driven-", caption, "run", history, flights, rigid),
         build_section(

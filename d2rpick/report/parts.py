@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.base.errors import format_ranges, list_names, make_printable
 from d2rpick.choice.pair.grades import DO_NOT_USE
+from d2rpick.deck.engine_files import CAP_SHARE
 from d2rpick.report import keys, tables
 from d2rpick.report.decision import format_saved_share, list_verdict_lines
 from d2rpick.report.fields import (
@@ -166,7 +167,7 @@ _SPARE: Final = (
     "energy scatter",
 )
 # Displayed verdicts on parts, keyed by verdict.
-_VERDICTS: Final = {"switch": "make rigid", "keep": "no"}
+_VERDICTS: Final = {"switch": "yes", "keep": "no"}
 # Displayed names of the sets, keyed by set name.
 _SET_NAMES: Final = {
     "all that may": "all eligible parts",
@@ -360,7 +361,7 @@ def _format_lower_bound(part_set: PartSet, value: float | None) -> str:
 def name_verdict(row: PartRow) -> str:
     """Return in one or two words whether to make a part rigid."""
     if row.merge_with is not None:
-        return f"merge with {row.merge_with}"
+        return f"yes, with {row.merge_with}"
     return _VERDICTS.get(row.verdict, row.verdict)
 
 
@@ -470,7 +471,10 @@ def list_page_remarks(answer: Parts) -> list[tuple[str, str]]:
         else:
             much = f"{best.step_growth:.2g} times"
         grows = f"may grow {much} while these parts are rigid"
-        cures = "limit it with --step-cap; to include its gain in the saving, give --step-ratio"
+        cures = (
+            f"the cards limit it to 1/{CAP_SHARE} of the rigid time (--step-cap sets another limit); "
+            "to include its gain in the saving, give --step-ratio"
+        )
         lines.append(("time step", f"{grows}; {cures}"))
     lines += [
         (name_set(part_set), reason)

@@ -210,7 +210,8 @@ DOCUMENT: Final = Document(
 def as_table(plan: RunPlan, display: DisplayOptions) -> str:
     """Return the plan in one sentence, the next command, a row per flight, and reasons with improvements."""
     if plan.flights:
-        rows = tables.as_text(*build_flight_table(plan), display.width, _SPARE)
+        known_columns = tables.select_known_columns(*build_flight_table(plan))
+        rows = tables.as_text(*known_columns, display.width, _SPARE)
     else:
         rows = "no flight"
     below = [*list_verdicts(plan), *list_plan_remarks(plan), *list_reasons(plan)]
@@ -320,7 +321,11 @@ def list_next_steps(
     elif needs_deck(plan.history, plan.settings):
         step = name_step_to_deck(question)
     if written_deck:
-        step = f"run the deck in {written_deck.folder} from t = 0"
+        folder = written_deck.folder
+        compare = write_command(question, "verify", "--switched", folder)
+        step = (
+            f"run the deck in {folder} from t = 0, and compare the run with {compare}"
+        )
         if not written_deck.passed:
             step = f"correct what the check of the written deck found, then {step}"
         elif written_deck.warned:
@@ -337,7 +342,10 @@ def _list_step_without_window(
     """Return the next command of a plan without a window that can be used now."""
     rows = [row for row in plan.flights if row.answer and not row.done]
     if not rows:
-        return []
+        if plan.done or not plan.flights:
+            return []
+        line = write_command(question, "explore")
+        return [("next", f"compare all td of the longest flight with {line}")]
     answer = max(rows, key=lambda row: row.end - row.start).answer
     assert answer is not None
     better = answer.decision.better if answer.decision else None

@@ -165,7 +165,7 @@ def list_health_measures(health: Health) -> list[Measure]:
         Measure(
             "energy ratio",
             span and f"{span[0]:.4g} to {span[1]:.4g}",
-            f"within {limits.MOST_IMBALANCE:.0%} of 1",
+            f"{1 - limits.MOST_IMBALANCE:g} to {1 + limits.MOST_IMBALANCE:g}",
             span and max(1 - span[0], span[1] - 1) <= limits.MOST_IMBALANCE,
         ),
         _make_share_measure(
@@ -188,9 +188,13 @@ def list_health_measures(health: Health) -> list[Measure]:
                 MOST_WORK,
             ),
             _make_share_measure(
-                "work beyond gravity and damping there", health.window_work, MOST_WORK
+                "work beyond gravity and damping in the window",
+                health.window_work,
+                MOST_WORK,
             ),
-            _make_share_measure("energy eroded there", health.window_eroded, 0.0),
+            _make_share_measure(
+                "energy eroded in the window", health.window_eroded, 0.0
+            ),
         ]
     return measures
 

@@ -128,7 +128,13 @@ _LINE: Final = row(
 )  # fmt: skip
 _MOST_REASONS: Final = 3
 # Columns that are omitted, in this order, if a terminal is too narrow; the energy at td is omitted before them.
-_SPARE: Final = ("+-", "basis", "error at common tr")
+_SPARE: Final = (
+    "+-",
+    "basis",
+    "error at common tr",
+    "residual at common tr",
+    "level error at common tr",
+)
 LAST: Final = Document("d2rpick/study/1", _MEANING, _SHARED)
 DOCUMENT: Final = Document(
     LAST.name,
@@ -212,8 +218,8 @@ def build_run_table(answer: StudyOfRuns) -> tuple[list[str], list[list[tables.Ce
         "residual": lambda run_and_error: tables.format_measure(
             run_and_error[0].residual
         ),
-        "error at common tr": lambda run_and_error: tables.format_measure(
-            run_and_error[1]
+        f"{_name_error(answer)} at common tr": lambda run_and_error: (
+            tables.format_measure(run_and_error[1])
         ),
         "verdict": lambda run_and_error: run_and_error[0].verdict,
         "basis": lambda run_and_error: run_and_error[0].basis,

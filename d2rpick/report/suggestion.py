@@ -332,7 +332,7 @@ def _explain_shorter_window(answer: PairSuggestion, longer: Pair, chosen: Pair) 
     """Return why a longer pair was not chosen: its verdict, its residual or the bound of it, its level, or its tr."""
     decision, own = answer.decision_on_longer, answer.decision
     if decision and own and not decision.reaches(own.grade):
-        return f"its verdict is {decision.verdict!r}, because {decision.reason}"
+        return f"its verdict is {decision.verdict!r}: {decision.reason}"
     if longer.residual is None or chosen.residual is None:
         return "it has a lower level at td"
     format_measure = tables.format_measure

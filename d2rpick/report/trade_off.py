@@ -356,9 +356,7 @@ def _format_offer_error(offer: Offer) -> str:
     if offer.error is None:
         return "an energy above twice its mean"
     if offer.basis == "energy":
-        return (
-            f"error {tables.format_measure(offer.error)} (shortfall of the level at td)"
-        )
+        return f"level shortfall {tables.format_measure(offer.error)}"
     return f"residual {tables.format_measure(offer.error)}"
 
 
@@ -398,10 +396,21 @@ def build_offer_table(
     first = trade_off.requested or trade_off.recommended
     columns = {
         "": lambda offer: "*" if offer is first else " ",
-        **_COLUMNS,
+        **{
+            _name_errors(offers) if name == "error" else name: get
+            for name, get in _COLUMNS.items()
+        },
         "verdict": lambda offer: _format_verdict(offer, numbers),
     }
     return tables.fill_table(columns, offers)
+
+
+def _name_errors(offers: Sequence[Offer]) -> str:
+    """Return the name of the errors of the proposed pairs, or "error" if they differ in kind."""
+    is_by_level = {offer.basis == "energy" for offer in offers}
+    if len(is_by_level) > 1:
+        return "error"
+    return "level shortfall" if True in is_by_level else "residual"
 
 
 def list_offer_reasons(offers: Sequence[Offer]) -> list[tuple[str, str]]:

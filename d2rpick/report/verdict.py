@@ -26,7 +26,7 @@ from d2rpick.report.situation import list_situation_heading
 if TYPE_CHECKING:
     from d2rpick.choice.answers import PairVerdict
     from d2rpick.choice.switched.comparison import Comparison
-    from d2rpick.report.formats import DisplayOptions, RepeatedQuestion
+    from d2rpick.report.formats import DisplayOptions
 
 # Fields of the judged pair, of its measured values, and of the verdict on it.
 MEASURES: Final = row(
@@ -81,7 +81,7 @@ def as_table(answer: PairVerdict, display: DisplayOptions) -> str:
     above = list_situation_heading(answer.situation, verbose=display.verbose)
     verdict_lines = [
         *list_pair_verdict(answer),
-        *list_next_step(answer, display.question),
+        *list_next_step(answer, display),
     ]
     if answer.switched:
         verdict_lines = [list_comparison_verdict(answer.switched), *verdict_lines]
@@ -107,9 +107,10 @@ def list_pair_verdict(answer: PairVerdict) -> list[tuple[str, str]]:
 
 
 def list_next_step(
-    answer: PairVerdict, question: RepeatedQuestion
+    answer: PairVerdict, display: DisplayOptions
 ) -> list[tuple[str, str]]:
-    """Return the next command: to the card of a usable pair, to a page on its switched run, or to a better pair."""
+    """Return the next command: it leads to the card of a usable pair, a page on its switched run, or a better pair."""
+    question = display.question
     decision = answer.decision
     situation = answer.situation
     if decision.verdict == DO_NOT_USE:
@@ -121,6 +122,8 @@ def list_next_step(
             f"compare other td with {line}",
             decision,
         )
+    elif answer.switched and display.page:
+        step = f"use the results of the switched run; {display.page} contains the comparison"
     elif answer.switched:
         words = (*question.times, "--report", "verify.html")
         line = write_command(question, "verify", *words)
@@ -136,9 +139,9 @@ def list_comparison_verdict(switched: Comparison) -> tuple[str, str]:
     compared = []
     if switched.mean_after_reference > 0:
         ratio = switched.mean_after / switched.mean_after_reference
-        limits = f"{switched.min_mean:g} to {2 - switched.min_mean:g}"
+        limits = f"{100 * switched.min_mean:g}% to {100 * (2 - switched.min_mean):g}%"
         compared.append(
-            f"mean energy after td {ratio:.2f} times that of the reference run (limits {limits})"
+            f"mean energy after td {ratio:.0%} of the reference run (limits {limits})"
         )
     if switched.momentum_error is not None:
         limit = f"limit {MOST_MOMENTUM_ERROR:.0%}"
@@ -167,9 +170,9 @@ def list_known_measures(answer: PairVerdict) -> list[tuple[str, tables.Cell]]:
     unit = answer.situation.history.energy_unit
     unit_text = f" [{make_printable(unit)}]" if unit else ""
     rows: list[tuple[str, tables.Cell]] = [
-        (f"energy at tr{unit_text}", best.energy),
-        (f"energy at td{unit_text}", answer.energy_td),
-        ("energy at tr / at td", best.level_ratio),
+        (f"E(tr), energy at tr{unit_text}", best.energy),
+        (f"E(td), energy at td{unit_text}", answer.energy_td),
+        ("E(tr)/E(td)", best.level_ratio),
         ("level error", tables.format_if_known(best.level_error, ".3f")),
         ("direction of the deformation at tr", direction),
         ("kinetic fraction at td", tables.format_if_known(answer.kinetic_share, ".3f")),
@@ -191,7 +194,7 @@ def as_markdown(answer: PairVerdict, display: DisplayOptions) -> str:
         (
             *comparison_lines,
             *list_pair_verdict(answer),
-            *list_next_step(answer, display.question),
+            *list_next_step(answer, display),
             *list_pair_evidence(answer),
         )
     )

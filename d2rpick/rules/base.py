@@ -14,7 +14,7 @@ from d2rpick.base.tuples import NamedTuple
 from d2rpick.deck.card import CardField
 from d2rpick.deck.ls_dyna_columns import DATABASE
 from d2rpick.deck.ls_dyna_parts import (
-    CONSTRAINT_KINDS,
+    DELETING_FLAGS,
     Constraint,
     DeckParts,
     find_element_cards,
@@ -249,7 +249,7 @@ class Case:
     @cached_property
     def constraints(self) -> Sequence[Constraint]:
         """Return the constraints of the deck that may belong to a switched part."""
-        return [*read_constraints(self.deck, *CONSTRAINT_KINDS)]
+        return [*read_constraints(self.deck, *DELETING_FLAGS)]
 
     @cached_property
     def parts_of_constrained_nodes(self) -> Mapping[int, set[int]]:

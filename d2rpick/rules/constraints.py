@@ -13,7 +13,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.errors import choose_verb, name_units
-from d2rpick.deck.ls_dyna_parts import read_merged_bodies
+from d2rpick.deck.ls_dyna_parts import DELETING_FLAGS, read_merged_bodies
 from d2rpick.rules.base import ERROR, WARNING, Case, Objection, group_values
 from d2rpick.rules.rule import (
     BACK,
@@ -36,18 +36,8 @@ if TYPE_CHECKING:
     from d2rpick.deck.switching import SwitchSet
 
 _DELETED = 1  # Value of NRBF or NCSF with which a card deletes constraints.
-# Flags that delete each kind of constraint. For extra nodes and joints no source says which; either flag is accepted.
-_FLAGS: Final[Mapping[Kind, tuple[str, ...]]] = {
-    "nodal rigid body": ("NRBF",),
-    "generalized weld": ("NRBF",),
-    "spotweld": ("NCSF",),
-    "rivet": ("NCSF",),
-    "constrained node set": ("NCSF",),
-    "extra nodes": ("NRBF", "NCSF"),
-    "joint": ("NRBF", "NCSF"),
-}
 _NODAL: Final[tuple[Kind, ...]] = ("nodal rigid body",)
-_OTHERS: Final = tuple(kind for kind in _FLAGS if kind not in _NODAL)
+_OTHERS: Final = tuple(kind for kind in DELETING_FLAGS if kind not in _NODAL)
 
 _COUNTS: Final = "         0         0         0       0.0         1         0"
 _MESH: Final = "*ELEMENT_SHELL\n       1       1       1       2       3       4\n"
@@ -90,7 +80,7 @@ def _make_joined_deck(text: str, flags: str, *lines: str) -> Example:
 
 
 class _Flags(NamedTuple):
-    """The flags NRBF and NCSF on a card that makes parts rigid, and the field of the first flag."""
+    """The flags NRBF and NCSF on a card that makes parts rigid, and the field of the first of these flags."""
 
     nrbf: int
     ncsf: int
@@ -98,18 +88,20 @@ class _Flags(NamedTuple):
 
     def describe(self, kind: Kind) -> str:
         """Return the flags for a kind of constraint with their values, such as 'NRBF 0 and NCSF 0'."""
-        return " and ".join(f"{name} {self._value(name)}" for name in _FLAGS[kind])
+        return " and ".join(
+            f"{name} {self._value(name)}" for name in DELETING_FLAGS[kind]
+        )
 
     def deletes(self, kind: Kind) -> bool:
         """Return True if the card deletes the constraints of a kind."""
-        return any(self._value(name) == _DELETED for name in _FLAGS[kind])
+        return any(self._value(name) == _DELETED for name in DELETING_FLAGS[kind])
 
     def _value(self, name: str) -> int:
         return self.nrbf if name == "NRBF" else self.ncsf
 
 
 def _find_flags(case: Case, card: SwitchSet) -> _Flags | None:
-    """Return the flags of a card; restarts have them on *RIGID_DEFORMABLE_CONTROL, and plain cards have no flags."""
+    """Return the flags of a card. Restarts have them on *RIGID_DEFORMABLE_CONTROL, and plain cards have none."""
     if card.header:
         nrbf = card.header.nrbf
         ncsf = card.header.ncsf
@@ -324,8 +316,8 @@ def _check_other_constraints(case: Case) -> Iterator[Objection]:
     satisfies this rule.
 
     Fix: Set the flag to 1 on the card that makes the part rigid and to 2 on the card that switches it back: NCSF for
-    spotwelds, rivets and node sets, NRBF for generalized welds, both for joints and extra nodes. If the constraint joins parts
-    that do not become one rigid body, merge them by LRB first (D2R121).
+    spotwelds, rivets and node sets, NRBF for generalized welds, both for joints and extra nodes. If the constraint
+    joins parts that do not become one rigid body, merge them by LRB first (D2R121).
     """
     return _find_active(case, _OTHERS, "D2R121")
 

@@ -307,7 +307,7 @@ def _check_shared_nodes(case: Case) -> Iterator[Objection]:
 
 
 def find_lead_parts(first: Mapping[int, SwitchEvent]) -> dict[int, int]:
-    """Return the lead part of the rigid body of each part in ``first``, keyed by part id.
+    """Return the lead part of the rigid body of each part in ``first``, by part id.
 
     The lead part is the end of the chain of LRB entries.  A part that is not merged leads itself.
     """

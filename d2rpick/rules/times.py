@@ -523,7 +523,7 @@ def _check_flight(case: Case) -> Iterator[Objection]:
 @set_passing(*_PASSING)
 @set_failing(_make_pair_deck(".0135867", "0.16"))
 @make_rule_decorator(
-    "D2R205", ERROR, "tr or td outside the record of the reference run", BOTH
+    "D2R205", ERROR, "time or part that the history does not contain", BOTH
 )
 def _check_in_history(case: Case) -> Iterator[Objection]:
     """The energy outside the history is unknown, and so is the energy of a part that the history does not contain.

@@ -79,7 +79,7 @@ class Driven:
 class Driver:
     """Computes one run in its folder, continuing after the last record of its journal.
 
-    ``told`` is called with each event, in one line.  ``at`` is the leg that is being computed.
+    ``report`` is called with each event, in one line.  ``at`` is the leg that is being computed.
     """
 
     deck: DrivenDeck
@@ -87,7 +87,7 @@ class Driver:
     journal: Journal
     limits: Limits
     looks: Looks
-    told: Callable[[str], None]
+    report: Callable[[str], None]
     at: Order | None = None
 
     def prepare(self) -> None:
@@ -116,13 +116,6 @@ class Driver:
             )
         self.journal.add("prepared")
 
-    def progress(self, seconds: float) -> str:
-        """Describe the engine run being computed, or how many ``seconds`` the starter has run before the first one."""
-        leg = self.at
-        if leg is None:
-            return f"starting ... {seconds:.0f} s"
-        return f"engine run {leg.number}, {leg.kind}: {leg.start:.6g} to {leg.until:.6g} of {self.limits.end:g}"
-
     def run(self) -> None:
         """Compute one engine run after another, up to the end of the run.
 
@@ -132,7 +125,7 @@ class Driver:
             If the solver fails or the disk is full.  The run continues from there when it is driven again.
         """
         if legs := self.journal.legs:
-            self.told(
+            self.report(
                 f"resumed: {len(legs)} engine runs are done, the last until {legs[-1].order.until:.6g}"
             )
             if self.journal.has_failed:
@@ -165,7 +158,7 @@ class Driver:
         legs = self.journal.legs
         self.journal.add("back", legs=len(legs) - 1)
         start = legs[-1].order.start
-        self.told(f"the last engine run is computed again from {start:.6g}: {reason}")
+        self.report(f"the last engine run is computed again from {start:.6g}: {reason}")
 
     def _start(self, order: Order) -> None:
         """Write the engine file of an engine run and start the engine."""
@@ -179,7 +172,7 @@ class Driver:
         write_as_a_whole(self.solver.file(number, ".rad"), text)
         self.journal.add("started", order=order)
         self.solver.start("engine", number)
-        self.told(
+        self.report(
             f"engine run {number}: {order.kind} from {order.start:.6g} to {order.until:.6g}"
         )
 
@@ -192,11 +185,11 @@ class Driver:
                 silence = self.solver.silent_for()
                 if silence > reported_at:
                     reported_at = 2 * silence
-                    self.told(
+                    self.report(
                         f"the solver has written nothing for {silence:.0f} s; stop it with Ctrl-C, then --resume"
                     )
         except KeyboardInterrupt:
-            self.told("stopping: --resume computes the current engine run again")
+            self.report("stopping: --resume computes the current engine run again")
             self.solver.end()
             raise
 
@@ -224,7 +217,7 @@ class Driver:
         self.journal.add("failed", leg=order.number)
         if has_failed or not self.solver.ended_well(order.number):
             raise D2RPickError(f"{self.solver.file(order.number, '.out')}: {problem}")
-        self.told(
+        self.report(
             f"engine run {order.number}: its restart file or history is incomplete; "
             f"computing it again from {order.start:.6g}"
         )
@@ -242,7 +235,7 @@ class Driver:
         if findings.contact is not None:
             window = find_next_window(self.journal.legs, self.limits)
             if window.warning:
-                self.told(f"warning: out-of-place: {window.warning}")
+                self.report(f"warning: out-of-place: {window.warning}")
         kept_restarts = {number, number - 1, number - 2}
         if order.rigid:
             # The restart file from before the window is needed in case the window is not used after all.
@@ -279,11 +272,15 @@ def find_leg_results(order: Order, evidence: GrowingEvidence) -> LegFindings:
     flights = evidence.flights()
     flies = bool(flights) and flights[-1].end is None
     free = evidence.free_since(history.end)
+    if flies:
+        free = max(free, flights[-1].start)
     tr = _choose_end(order, history, free)
     half_period = evidence.motion.longest_swing(history.end)
     findings = LegFindings(free=free, flies=flies, tr=tr, swing=half_period)
     if flies and (swing := find_swing(history, free, tr)):
-        findings = findings._replace(steady_from=swing.flight, swing_warning=swing.told)
+        findings = findings._replace(
+            steady_from=swing.flight, swing_warning=swing.warning
+        )
     wait = evidence.find_wait(free, history.end)
     if wait is None:
         return findings

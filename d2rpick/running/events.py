@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History
     from d2rpick.running.evidence import GrowingEvidence
     from d2rpick.running.swing import Swing
-    from d2rpick.running.witness import Quiet
+    from d2rpick.running.witness import SeenFlight
 
 # Smallest height of the internal energy above its recent minimum at a good tr, relative to its recent range [-].
 # In computed runs, a tr at an energy minimum locked in half of the energy at td, and a tr at a peak 90 % or more.
@@ -42,7 +42,7 @@ class RunEvent(NamedTuple):
     event: str
     time: float
     seen: float
-    flight: Quiet | None = None
+    flight: SeenFlight | None = None
     tr: float | None = None
     energy: EnergyRange | None = None
     swing: Swing | None = None
@@ -85,7 +85,9 @@ def find_events(evidence: GrowingEvidence) -> tuple[RunEvent, ...]:
     return tuple(sorted(events, key=lambda event: event.seen))
 
 
-def _list_events_of(flight: Quiet, evidence: GrowingEvidence) -> Iterator[RunEvent]:
+def _list_events_of(
+    flight: SeenFlight, evidence: GrowingEvidence
+) -> Iterator[RunEvent]:
     """Yield the events of a flight: its start, the advised switch, and the contact that ends it."""
     key = flight.start, flight.seen
     events = evidence.decided.get(key)
@@ -102,7 +104,7 @@ def _list_events_of(flight: Quiet, evidence: GrowingEvidence) -> Iterator[RunEve
         yield event._replace(flight=flight_so_far)
 
 
-def _suggest_switch(history: History, flight: Quiet) -> Iterator[RunEvent]:
+def _suggest_switch(history: History, flight: SeenFlight) -> Iterator[RunEvent]:
     """Advise when to switch in a flight: at once if nothing vibrates, otherwise while the internal energy is high.
 
     If it is low for one wait, the time of its maximum is advised.
@@ -138,7 +140,7 @@ def highest_energy(history: History, start: float, end: float) -> float:
     return float(time[energy.size - 1 - int(np.argmax(energy[::-1]))])
 
 
-def _find_strong_swing(history: History, flight: Quiet, tr: float) -> Swing | None:
+def _find_strong_swing(history: History, flight: SeenFlight, tr: float) -> Swing | None:
     """Return the part that oscillates too strongly in a flight that has lasted up to tr; None if there is none."""
     swing = find_swing(history, flight.start, tr) if flight.parts else None
     return swing if swing and swing.flight > tr - flight.start else None

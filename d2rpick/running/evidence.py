@@ -17,7 +17,7 @@ from d2rpick.histories.history import EXACT, select_states
 from d2rpick.histories.samples import find_stretches, find_window
 from d2rpick.running.inner_motion import InnerMotion, Wait
 from d2rpick.running.record import GrowingColumn, RunningMaximum
-from d2rpick.running.witness import GrowingWitness, Quiet
+from d2rpick.running.witness import GrowingWitness, SeenFlight
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -131,19 +131,19 @@ class GrowingEvidence:
         if not has_momentum[-1:].all():
             self._going_on.pop(parts, None)
 
-    def flights(self) -> tuple[Quiet, ...]:
+    def flights(self) -> tuple[SeenFlight, ...]:
         """Return all flights that lasted for the required force-free time, in ascending order.
 
         As the run goes on, flights are only added, and the last one gets its ``end``.
         """
-        candidates: list[tuple[Quiet, float]] = []
+        candidates: list[tuple[SeenFlight, float]] = []
         for witness in self.witnesses:
             witness.examine(self.find_wait, self._find_gravity)
             last_time = float(witness.time[-1])
             candidates += [(flight, last_time) for flight in witness.flights]
         # If the parts and the model show a flight at the same state, the flight of the parts comes first.
         candidates.sort(key=lambda pair: pair[0].seen)
-        chosen: list[Quiet] = []
+        chosen: list[SeenFlight] = []
         for flight, last_time in candidates:
             last_end = chosen[-1].end if chosen else -np.inf
             if last_end is None or flight.seen <= last_end:
@@ -202,9 +202,11 @@ class GrowingEvidence:
         start, end = begin + first, begin + last
         states = [*_sample_states(begin, start), *_sample_states(start + 1, end)]
         so_far = select_states(momenta, np.array(states, np.intp))
-        if so_far.change(witness.members) <= so_far.noise(witness.members):
-            return 0.0  # A fit to a constant momentum would give a false gravity.
         laws = get_laws_of(so_far, witness.members, history.balance)
+        if witness.is_constant(first, last):
+            # A fit to a constant momentum would give a false gravity.
+            flies = witness.moves(first, last) and not laws.is_carried
+            return 0.0 if flies else None
         return laws.gravity(states.index(start), len(states) - 1)
 
     def free_since(self, time: float) -> float:

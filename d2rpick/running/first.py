@@ -26,6 +26,7 @@ from d2rpick.deck.radioss_run import find_parts_off, read_run
 from d2rpick.deck.radioss_sensors import list_forces
 from d2rpick.deck.reader import read_deck
 from d2rpick.deck.sensor_cards import write_flight_sensors
+from d2rpick.deck.suiting import find_suiting
 from d2rpick.deck.switch_sets import Waiting, write_set_pair
 from d2rpick.running.checks import NO_CONTACT, refuse_held
 from d2rpick.running.inner_motion import Wait, check_wait, wait_of_deck
@@ -64,6 +65,10 @@ _OF_LS_DYNA: Final = (
     "CODE 2 has no force-free time: after TIME1, zero force makes parts rigid, even between two pulses.",
     "These switches do not react to other contacts, rigid walls and loads.",
     "These cards were not tested with the solver.",
+)
+_DELETED: Final = (
+    "Constraints that all lie on these parts are deleted while the parts are rigid (NRBF or NCSF 1), and then activated"
+    " again (2)."
 )
 _AT_REST: Final = "In free fall from rest: rigid from 0, TIME1 0."
 _OF_LOAD: Final = "TIME1 is 0: if you know the end of the load, give it (--after)."
@@ -212,9 +217,18 @@ def _make_ls_dyna_card(
     deck = read_deck(path)
     contact, keyword = _find_contact(path, deck)
     part_ids = check_ids(parts)
-    printing = Printing(part=tuple(part_ids), bodies=inventory.bodies(part_ids))
+    suiting = find_suiting(path, part_ids)
+    printing = Printing(
+        part=tuple(part_ids),
+        bodies=inventory.bodies(part_ids),
+        swset=suiting.swset or Printing().swset,
+        delete_nodal_bodies=suiting.delete_nodal_bodies,
+        delete_node_sets=suiting.delete_node_sets,
+    )
     offset, offset_note = _choose_offset(inventory, keyword)
     notes = [_explain_wait(wait), *_OF_ALL, *_OF_LS_DYNA, offset_note]
+    if suiting.delete_nodal_bodies or suiting.delete_node_sets:
+        notes.append(_DELETED)
     if after is None:
         starts_moving = deck.named("INITIAL_VELOCITY")
         at_rest = bool(inventory.boundary.gravity) and not starts_moving

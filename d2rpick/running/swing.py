@@ -31,7 +31,7 @@ class Swing(NamedTuple):
     at_most: bool = False
 
     @property
-    def told(self) -> str:
+    def warning(self) -> str:
         """The warning that is printed before the body becomes rigid."""
         motion, limit = "still moves relative to the others", "about"
         if self.at_most:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from d2rpick.deck.model import Inventory
     from d2rpick.histories.names import Selection
     from d2rpick.running.events import RunEvent
-    from d2rpick.running.witness import Quiet
+    from d2rpick.running.witness import SeenFlight
 
     # Inode number of a file, its size, and the time at which it was written [s].
     FileStamp = tuple[int, int, float]
@@ -36,7 +36,6 @@ _SHARE: Final = 0.01
 _SHORTEST, _LONGEST = 0.5, 5.0
 # A run is reported as silent after this time without output [s].
 _SILENT: Final = 60.0
-_PACKED: Final = "normally: its history is packed"
 _NO_EVIDENCE: Final = (
     "neither momenta nor the contact energy are written, so no force can be recognised; write them "
     "(Radioss: /TFILE and /TH/PART with DEF, MASS; LS-DYNA: *DATABASE_GLSTAT and _MATSUM)"
@@ -54,7 +53,7 @@ class News(NamedTuple):
         New events.
     undone_events : tuple of RunEvent
         Earlier events that the run no longer has, because it was restarted.
-    flight : Quiet or None
+    flight : SeenFlight or None
         Latest flight.
     knows_wait : bool
         True if it is known which force-free time shows a flight.
@@ -70,7 +69,7 @@ class News(NamedTuple):
     now: float | None = None
     events: tuple[RunEvent, ...] = ()
     undone_events: tuple[RunEvent, ...] = ()
-    flight: Quiet | None = None
+    flight: SeenFlight | None = None
     knows_wait: bool = False
     ending: str | None = None
     silence: float | None = None
@@ -117,7 +116,7 @@ class Watch:
                 # The error is not raised, because the solver may be writing to the file at this moment.
                 news = news._replace(error=error)
         if news.now is not None and files:
-            news = news._replace(ending=_find_ending([*files][-1]))
+            news = news._replace(ending=find_ending([*files][-1]))
         now = time.time()
         silence = now - max((written for _, _, written in files.values()), default=now)
         if news.error and silence > _SILENT:
@@ -150,11 +149,6 @@ class Watch:
             flight=flights[-1] if flights else None,
             knows_wait=wait is not None,
         )
-
-
-def _find_ending(name: str) -> str | None:
-    """Return how the run of a history has ended; None if it may still be computed."""
-    return _PACKED if name.endswith(".gz") else find_ending(name)
 
 
 def follow(

@@ -7,7 +7,8 @@ and `model.model_at` decides which one can be relied on at a td:
 1. oscillator (`identify`, `fitting`, `modes`, `span`): E = E_pl + (q_0 + q)^2 with q = exp(-alpha t/2) (a cos omega t
    + b sin omega t), the published floating oscillator (`oscillator`), fitted by least squares in the longest window
    around td in which it describes the record.  Systematic structure in the rest refuses it.
-2. modal (`lines`, `midpoint`, `modal`, `modal_span`, `locked_lines`): any number of modes.  The energy halfway
+2. modal (`lines`, `refined_lines`, `midpoint`, `modal`, `modal_span`, `locked_lines`, `close_modes`): any number of
+   modes.  The energy halfway
    between tr and td gives the product of both deformations, X = V(m) - H(m)/2 + C(m, tau)/2, and with it
    R^2 = 1 + [V(tr) - 2 X]/U(td); H and C follow from the lines of the energy.  Doubts refuse a record or widen
    the band of R.

@@ -17,9 +17,22 @@ class SignedAmplitudes:
         """Return the signed deformation of each mode at ``t``; the first axis indexes the modes [sqrt(energy)]."""
         raise NotImplementedError
 
+    def vibration_energy(self, t: Samples | float) -> Samples:
+        """Return the energy of the vibration, with the shape of ``t`` [energy]."""
+        raise NotImplementedError
+
     def elastic_energy(self, t: Samples | float) -> Samples:
         """Return the sum over all modes of the squared deformations, with the shape of ``t`` [energy]."""
         return np.asarray(np.sum(self.amplitudes(t) ** 2, axis=0))
+
+    def compare(
+        self, tr: Samples | float, td: Samples | float
+    ) -> tuple[Samples, Samples]:
+        """Return `separation` and `overlap` from one evaluation, with the shape of ``tr`` [energy]."""
+        at_tr, at_td = self.amplitudes(tr).T, self.amplitudes(td).T
+        separation = np.sum((at_tr - at_td) ** 2, axis=-1)
+        overlap = np.sum(at_tr * at_td, axis=-1)
+        return np.asarray(separation.T), np.asarray(overlap.T)
 
     def overlap(self, tr: Samples | float, td: Samples | float) -> Samples:
         """Return the sum of q(tr) q(td) over all modes, with the shape of ``tr`` [energy]; ``td`` may be an array."""

@@ -191,8 +191,9 @@ class Pencil(NamedTuple):
             max(_CELLS_PER_PERIOD * periods, _MIN_CELLS), s.size - 1, _MAX_CELLS
         )
         cells = average_cells(s, running, count)
-        hankel = np.lib.stride_tricks.sliding_window_view(
-            cells, min(_LAGS, count // 2) + 1
+        # A copy, which is multiplied by itself in half the time of overlapping views.
+        hankel = np.ascontiguousarray(
+            np.lib.stride_tricks.sliding_window_view(cells, min(_LAGS, count // 2) + 1)
         )
         return cls(np.linalg.eigh(hankel.T @ hankel)[1][:, ::-1], count)
 
@@ -327,17 +328,17 @@ def _build_normal_equations(
     parameters: Samples, model: Model, s: Samples, e: Samples
 ) -> tuple[float, Samples, Samples]:
     """Return the squared misfit, the matrix J J^T of the derivatives J, and J times the misfit, computed by blocks."""
-    cost = 0.0
-    normal = np.zeros(())
-    gradient = np.zeros(())
+    blocks = []
     for first in range(0, s.size, BLOCK):
         block = slice(first, first + BLOCK)
         energy, jacobian = model(parameters, s[block])
         remainder = e[block] - energy
-        cost = cost + float(remainder @ remainder)
-        normal = normal + jacobian @ jacobian.T
-        gradient = gradient + jacobian @ remainder
-    return cost, normal, gradient
+        cost = float(remainder @ remainder)
+        blocks.append((cost, jacobian @ jacobian.T, jacobian @ remainder))
+    if len(blocks) == 1:
+        return blocks[0]
+    costs, normals, gradients = zip(*blocks, strict=True)
+    return sum(costs), np.sum(normals, axis=0), np.sum(gradients, axis=0)
 
 
 def evaluate_energies(

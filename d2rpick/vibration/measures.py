@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from d2rpick.histories.history import Samples
+    from d2rpick.vibration.amplitudes import SignedAmplitudes
     from d2rpick.vibration.modes import Mode
 
     # Values for n times, as arrays of shape (n,) keyed by name; unknown values are NaN.
@@ -166,6 +167,14 @@ def sign_match(
     return np.asarray(vibration.overlap(tr, td) >= 0)
 
 
+def compare_signed(
+    vibration: SignedAmplitudes, tr: Samples, td: float
+) -> tuple[Samples, NDArray[np.bool_]]:
+    """Return `lock_in_error` and `sign_match` of each tr, from one evaluation of its deformation."""
+    separation, overlap = vibration.compare(tr, td)
+    return np.sqrt(separation) / np.sqrt(vibration.vibration_energy(td)), overlap >= 0
+
+
 def band_about(
     squared: Samples, off: Samples, hidden: Samples | float, left_out: Samples | float
 ) -> tuple[Samples, Samples, Samples]:
@@ -272,12 +281,12 @@ def _leaving(mode: Mode, edges: Samples, wanted: Samples, room: Samples) -> Samp
     middle = wanted[column]
     tolerated = room[column]
     side = np.sign(mode.deformation(outer) - middle)
-    leaving_time = narrow_brackets(
-        lambda t: tolerated - side * (mode.deformation(t) - middle),
-        inner,
-        outer,
-        slope=lambda t: -side * mode.velocity(t),
-    )
+
+    def stay_within(t: Samples) -> tuple[Samples, Samples]:
+        q, velocity = mode.motion(t)
+        return tolerated - side * (q - middle), -side * velocity
+
+    leaving_time = narrow_brackets(stay_within, inner, outer)
     distances = np.full(room.size, np.inf)
     distances[column] = np.abs(leaving_time.at - edges[0, column])
     return distances

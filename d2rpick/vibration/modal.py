@@ -15,6 +15,7 @@ import numpy as np
 from d2rpick.base.caching import cached_property
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.vibration import measures
+from d2rpick.vibration.close_modes import find_close_modes
 from d2rpick.vibration.doubts import (
     MOST_BEYOND,
     MOST_NEGATIVE,
@@ -34,6 +35,7 @@ from d2rpick.vibration.locked_lines import (
 from d2rpick.vibration.measures import Profile
 from d2rpick.vibration.midpoint import Reading
 from d2rpick.vibration.modes import SOLVER_FLOOR
+from d2rpick.vibration.refined_lines import refine_prediction
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -138,6 +140,8 @@ class ModalVibration:
         States of the record in a period of the fastest line that is told from noise [-].
     scatter : LineScatter
         Scatter of the squared residual that follows from that of the record.
+    with_close_modes : Reading or None
+        Interpretation in which one line is that of two close modes, and no energy is static.
     swinging : float
         Mean energy in parts of the record that swing in a way that no mode does [energy].
     bent : float
@@ -160,6 +164,7 @@ class ModalVibration:
     systematic: float
     states_per_period: float
     scatter: LineScatter
+    with_close_modes: Reading | None = None
     swinging: float = 0.0
     bent: float = 0.0
     source: str = "internal energy"
@@ -396,7 +401,8 @@ class ModalVibration:
 
         Part of the static energy may be due to spectral lines hidden in the misfit.  That part is limited by the energy
         that the misfit can hide, and by the static energy itself.  A mode that does not complete a cycle is confused
-        with slow decays, so what the first part of the record says of it is another interpretation.
+        with slow decays, so what the first part of the record says of it is another interpretation.  So are two close
+        modes, whose beat seems to be static energy.
         """
         none = np.zeros(squared.shape)
         shifts = [reading.residual_squared(tr, td) - squared for reading in self.others]
@@ -405,6 +411,8 @@ class ModalVibration:
             shifts.append(hidden / self.reading.level(td) * (1.5 - squared))
             nearest = np.argmin(np.abs(shifts), axis=0)
             shifts = [np.take_along_axis(np.array(shifts), nearest[np.newaxis], 0)[0]]
+        if self.with_close_modes is not None:
+            shifts.append(self.with_close_modes.residual_squared(tr, td) - squared)
         if self.has_slow_mode:
             first = self.of_first_part.residual_squared(tr, td)
             shifts.append(first - squared)
@@ -464,6 +472,7 @@ def identify_modal(
         np.abs(energy).max()
     ):
         return None
+    prediction = refine_prediction(grid, prediction)
     misfit = prediction.spectrum.error / prediction.swing
     systematic = _correlate_neighbours(prediction.spectrum.rest)
     if not _predicts_within(_SLOW_TOO, prediction.missed, misfit, systematic):
@@ -566,6 +575,9 @@ def _read(
     scatter = spectrum.error * np.sqrt(2 / grid.time.size)
     systematic = _correlate_neighbours(spectrum.rest)
     stretches, springs = _separate_stretches_from_springs(spectrum, grid, scatter)
+    close_modes = None
+    if not (kinetic or stretches or springs):
+        close_modes = find_close_modes(grid, prediction)
     may_be_spring = any(not third.is_of_spring for third in springs)
     plain = Reading(
         spectrum,
@@ -597,6 +609,9 @@ def _read(
         reading=reading,
         others=interpretation.others,
         of_first_part=_read_first_part(reading, prediction, grid, stretches, scatter),
+        with_close_modes=None
+        if close_modes is None
+        else _read_close_modes(reading, close_modes),
         doubts=doubts,
         noise=spectrum.error,
         systematic=systematic,
@@ -684,6 +699,17 @@ def _read_first_part(
         spectrum=first,
         is_mode=_mask_modes(first.lines, first_stretches),
         rest=np.zeros(grid.time.size),
+    )
+
+
+def _read_close_modes(reading: Reading, spectrum: Spectrum) -> Reading:
+    """Return the interpretation of a ``spectrum`` with two close modes, all lines of which are modes."""
+    return replace(
+        reading,
+        spectrum=spectrum,
+        is_mode=np.ones(spectrum.lines.poles.size, dtype=bool),
+        no_static=False,
+        hidden_pairs=0.0,
     )
 
 

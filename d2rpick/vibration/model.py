@@ -16,6 +16,7 @@ import numpy as np
 from d2rpick.base.caching import cached_property
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.vibration import MODELS, measures
+from d2rpick.vibration.amplitudes import SignedAmplitudes
 from d2rpick.vibration.fitting import MAX_MISFIT
 from d2rpick.vibration.identify import (
     MIN_SAMPLES_PER_PERIOD,
@@ -216,11 +217,11 @@ class Vibration:
             return np.where(np.isnan(errors), np.inf, errors)
         deformation = self.compared.deformation
         comparable = self.comparable(times)
-        if self.basis != "modal":
-            comparable &= measures.sign_match(deformation, times, self.td)
-        return np.where(
-            comparable, measures.lock_in_error(deformation, times, self.td), np.inf
-        )
+        if not isinstance(deformation, SignedAmplitudes):
+            errors = measures.lock_in_error(deformation, times, self.td)
+            return np.where(comparable, errors, np.inf)
+        errors, has_sign = measures.compare_signed(deformation, times, self.td)
+        return np.where(comparable & has_sign, errors, np.inf)
 
     def knots(self) -> Samples:
         """Return the times before td between which the errors are monotone [time]."""

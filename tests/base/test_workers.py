@@ -2,6 +2,7 @@
 
 import os
 import signal
+import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -165,6 +166,32 @@ def test_the_main_thread_holds_no_lock_of_the_pool(
         assert len(list(answers)) == 12
     assert entered
     assert not any(entered)
+
+
+def test_the_end_of_a_pool_does_not_race_with_the_exit_of_python() -> None:
+    """A pause where the handler at exit writes to the pool's pipe makes sure that its thread closes it meanwhile."""
+    code = """
+import time
+from concurrent.futures import process
+from d2rpick.base.workers import Cores
+
+def write_late(pipe):
+    if not pipe._closed:
+        time.sleep(0.3)
+        pipe._writer.send_bytes(b"")
+
+process._ThreadWakeup.wakeup = write_late
+with Cores(2, "json") as farm:
+    print(sorted(answer.result for answer in farm.answers(abs, [1, -2])))
+"""
+    result = subprocess.run(
+        [sys.executable, "-c", code],
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=TIME_LIMIT,
+    )
+    assert (result.stdout, result.stderr) == ("[1, 2]\n", "")
 
 
 def test_there_is_a_core() -> None:

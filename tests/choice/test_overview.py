@@ -282,10 +282,10 @@ def test_every_format_tells_the_same(matsum: Path) -> None:
     table = run("info", str(matsum)).stdout
     assert "states             1501" in table
     assert table.startswith(
-        "verdict  use\nwhy      1 free flight, the longest for 0.15"
+        "record  use it to choose times\nwhy     1 free flight, the longest for 0.15"
     )
     assert (
-        "flight   frame, suspended mass, spring from 0 to the end of the record, 0.15"
+        "flight  frame, suspended mass, spring from 0 to the end of the record, 0.15"
         in table
     )
     assert "next d2rpick plan --part flying " in join_wrapped_lines(table)

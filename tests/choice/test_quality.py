@@ -12,6 +12,7 @@ from hypothesis import given, settings, strategies as st
 
 from d2rpick.api import read, verify
 from d2rpick.choice.answers import suggest_in_history, verify_in_history
+from d2rpick.choice.pair.candidates import Candidate
 from d2rpick.choice.pair.grades import GRADES
 from d2rpick.choice.pair.quality import (
     EQUALLY_GOOD,
@@ -434,7 +435,7 @@ def test_a_tr_that_is_not_known_to_its_tolerance_is_fair() -> None:
     worst = [
         float(
             re.findall(
-                r"At worst: vibration\s+wrong by (\d+)%",
+                r"At worst: vibration\s+wrong by ([\d.]+)%",
                 as_table(answer_of_td, DisplayOptions()),
             )[0]
         )
@@ -442,6 +443,31 @@ def test_a_tr_that_is_not_known_to_its_tolerance_is_fair() -> None:
     ]
     assert worst[0] < 10
     assert worst[1] == 46
+
+
+@pytest.mark.parametrize(
+    ("low", "residual", "high", "wanted"),
+    [
+        (0.10, 0.15, 0.19, "good"),
+        (0.19, 0.20, 0.21, "good"),
+        (0.19, 0.21, 0.23, "good"),
+        (0.14, 0.23, 0.29, "good"),
+        (0.21, 0.22, 0.23, "fair"),
+        (0.14, 0.24, 0.31, "fair"),
+        (0.00, 0.15, 0.31, "fair"),
+    ],
+)
+def test_a_pair_is_good_if_it_may_be_and_is_not_much_worse_in_the_worst_case(
+    low: float, residual: float, high: float, wanted: str
+) -> None:
+    answer = suggest_in_history(
+        read_solved("oscillator_referenceT01.gz").history, 0.068753, Settings()
+    )
+    bounds = {"residual_low": low, "residual": residual, "residual_high": high}
+    banded = Candidate(**require(answer.chosen)._asdict() | bounds)
+    quality = grade_pair(answer.situation, banded)
+    assert quality.alone.grade == wanted
+    assert len(quality.alone.causes) == (wanted == "fair")
 
 
 def test_a_flight_that_vibrates_later_was_never_at_rest() -> None:

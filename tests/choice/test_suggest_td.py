@@ -133,10 +133,7 @@ def test_the_reason_against_a_longer_window_is_the_verdict_on_it() -> None:
     judged = run_json("verify", *times, *question, history)
     text = join_wrapped_lines(run("plan", *question, history).stdout)
     assert judged["verdict"] == "use with care"
-    assert (
-        f"but its verdict is 'use with care', because {judged['verdict_reason']}"
-        in text
-    )
+    assert f"but its verdict is 'use with care': {judged['verdict_reason']}" in text
     assert "has residual 0.000" not in text
 
 

@@ -60,7 +60,8 @@ def test_what_is_extracted_reads_back_bit_for_bit(
     file = tmp_path / f"energy.{suffix}"
     options = [option for name in energy for option in ("--energy", name)]
     result = run("extract", *options, source, "-o", str(file))
-    assert (result.exit_code, result.stdout, result.stderr) == (0, "", "")
+    assert (result.exit_code, result.stdout) == (0, "")
+    assert result.stderr == f"next: choose times with d2rpick suggest {file}\n"
     again = read_history([str(file)])
     assert again.channel == "internal_energy"
     assert again.format == ("csv" if suffix == "csv" else "hdf5")

@@ -111,12 +111,15 @@ def test_an_interrupt_during_the_imports_ends_the_program_without_a_word(
     assert process.returncode == -signal.SIGINT
 
 
-@pytest.mark.parametrize("rest", ["raise SystemExit(0)", "while True: pass"])
+@pytest.mark.parametrize(
+    ("rest", "message"),
+    [("raise SystemExit(0)", b""), ("while True: pass", b"d2rpick: interrupted")],
+)
 def test_an_interrupt_that_a_library_swallows_ends_the_program_all_the_same(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rest: str
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rest: str, message: bytes
 ) -> None:
     """This happens in a finalizer of an object, or while an extension module is imported."""
-    (tmp_path / "click.py").write_text(
+    (tmp_path / "numpy.py").write_text(
         "import os, signal\n"
         "class Swallowing:\n"
         "    def __del__(self):\n"
@@ -126,7 +129,8 @@ def test_an_interrupt_that_a_library_swallows_ends_the_program_all_the_same(
     )
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), str(ROOT)]))
     with start_program("info", ENERGY) as process:
-        assert process.communicate() == (b"", b"")
+        output, errors = process.communicate()
+    assert (output, errors.strip()) == (b"", message)
     assert process.returncode == -signal.SIGINT
 
 
@@ -134,14 +138,15 @@ def test_an_interrupt_ends_the_program_though_a_thread_goes_on(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Python waits for all threads at its end, and a thread may wait for a process that has died."""
-    (tmp_path / "click.py").write_text(
+    (tmp_path / "numpy.py").write_text(
         "import os, signal, threading, time\n"
         "threading.Thread(target=time.sleep, args=(300,)).start()\n"
         "os.kill(os.getpid(), signal.SIGINT)\n"
     )
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), str(ROOT)]))
     with start_program("info", ENERGY) as process:
-        assert process.communicate(timeout=30) == (b"", b"")
+        output, errors = process.communicate(timeout=30)
+    assert (output, errors.strip()) == (b"", b"d2rpick: interrupted")
     assert process.returncode == -signal.SIGINT
 
 

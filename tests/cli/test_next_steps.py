@@ -71,7 +71,9 @@ def test_the_step_after_info_keeps_the_selected_energy() -> None:
 def test_info_refuses_files_whose_flight_lasts_longer_than_the_energy() -> None:
     result = run("info", MATSUM, ENERGY)
     text = join_wrapped_lines(result.stdout)
-    assert text.startswith("verdict do not use why the flight from 0.086 to 0.379")
+    assert text.startswith(
+        "record do not use it to choose times why the flight from 0.086 to 0.379"
+    )
     assert "do all files belong to the same run?" in text
     assert "next" not in text.split("source")[0]
 

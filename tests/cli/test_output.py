@@ -154,7 +154,7 @@ def test_the_table_names_what_it_rests_on_and_marks_the_recommended_row() -> Non
         "to improve  use tr = 0.0135867, td = 0.0687534: vibration wrong by 0.0%",
     ]
     assert lines[4].startswith(
-        "expect      mean energy after td 8% of the reference run, vibration wrong by 95.7%"
+        "expect      mean energy after td 8% of the reference run, vibration wrong by 96% (residual 0.957)"
     )
     assert "motion     good" in lines
     assert "rigid for  0.0511147, 34% of the simulated time" in lines

@@ -45,7 +45,7 @@ def test_all_forms_hold_the_same() -> None:
         assert all(
             words in text
             for words in (
-                "merge with 1",
+                "yes, with 1",
                 "already rigid",
                 "all eligible parts",
                 "one rigid body",
@@ -105,7 +105,7 @@ def test_the_page_holds_parts_and_sets(tmp_path: Path) -> None:
     text = page.read_text("utf-8")
     assert all(
         words in text
-        for words in ("all eligible parts", "merge with 1", "already rigid", "SHA-256")
+        for words in ("all eligible parts", "yes, with 1", "already rigid", "SHA-256")
     )
     assert "http" not in text.replace("http-equiv", "")
 

@@ -218,11 +218,20 @@ def test_the_check_finds_in_a_card_what_was_asked_for(
 
 
 def test_rounding_is_reported() -> None:
-    card = print_cards([(0.0128853793630525, 0.064)], PARTS)
-    assert card.windows == ((0.01288538, 0.064),)
-    assert ".01288538" in card.notes[0]
-    assert card.notes[0] in card.text
-    assert print_cards([(0.02, 0.09)], PARTS).notes == ()
+    card = print_cards([(1.23456e-5, 0.064)], PARTS)
+    assert card.windows == ((1.2346e-5, 0.064),)
+    assert card.notes[0].startswith("tr = 1.23456e-05 is rounded to 1.2346e-5, ")
+    assert card.notes[0] in " ".join(card.text.replace("$", "").split())
+
+
+@pytest.mark.parametrize("tr", [0.02, 0.0128853793630525, 0.000499539])
+def test_rounding_beyond_the_six_digits_of_all_answers_is_not_reported(
+    tr: float,
+) -> None:
+    card = print_cards([(tr, 0.064)], PARTS)
+    assert card.notes == ()
+    assert f"$ Rigid from {tr:.6g} to 0.064;" in card.text
+    assert f"{card.windows[0][0]:.6g}" == f"{tr:.6g}"
 
 
 def test_warnings_are_those_that_apply() -> None:

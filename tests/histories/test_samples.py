@@ -158,9 +158,11 @@ def test_of_each_stretch_the_extremes_stay(states: int, seed: int) -> None:
 @given(ROOTS)
 def test_every_bracket_narrows_on_its_root(roots: np.ndarray) -> None:
     narrowed = narrow_brackets(
-        lambda t: roots**3 - t**3, np.zeros(roots.size), np.ones(roots.size),
-        slope=lambda t: -3 * t**2, steps=64,
-    )  # fmt: skip
+        lambda t: (roots**3 - t**3, -3 * t**2),
+        np.zeros(roots.size),
+        np.ones(roots.size),
+        steps=64,
+    )
     np.testing.assert_allclose(narrowed.at, roots, rtol=1e-12)
     assert np.all(narrowed.within <= narrowed.at)
     assert np.all(narrowed.at <= narrowed.beyond)
@@ -212,9 +214,7 @@ def test_a_root_is_the_same_to_the_last_digit_alone_and_beside_others(
         return [
             *map(
                 float,
-                narrow_brackets(
-                    lambda t: some**3 - t**3, *ends, slope=lambda t: -3 * t**2
-                ).at,
+                narrow_brackets(lambda t: (some**3 - t**3, -3 * t**2), *ends).at,
             )
         ]
 

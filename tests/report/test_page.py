@@ -539,5 +539,5 @@ def test_a_verdict_tells_health_parts_and_the_switched_run(tmp_path: Path) -> No
         "hourglass energy of box",
         "The window is 0.1 to 0.37",
     )
-    for text in (*texts, "0.66 times that of the reference run"):
+    for text in (*texts, "66% of that of the reference run"):
         assert text in page.text

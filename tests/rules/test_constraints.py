@@ -30,7 +30,7 @@ FLAGS = {
     "constrained node set": (0, 1),
     "joint": (0, 1),
 }
-HELD = {"D2R112", "D2R113", "D2R120", "D2R121"}
+HELD = {"D2R112", "D2R113", "D2R120", "D2R121", "D2R122"}
 
 
 def find_constraint_findings(
@@ -118,3 +118,22 @@ def test_extra_nodes_of_a_rigid_part_are_not_to_be_deleted_unless_it_leads(
     assert deleted.rule == "D2R121"
     led = [pad(1, 3, "PART").rstrip("\n")]
     assert not find_constraint_findings(tmp_path, extra, led, (0, 1))
+
+
+@pytest.mark.parametrize(
+    ("keyword", "named"),
+    [
+        ("*CONSTRAINED_RIGID_BODIES\n" + pad(3, 1), ["part 1"]),
+        ("*CONSTRAINED_RIGID_BODIES\n" + pad(3, 9) + pad(2, 1), ["parts 1, 2"]),
+        ("*CONSTRAINED_RIGID_BODIES_SET\n" + pad(3, 1), []),
+        ("*CONSTRAINED_RIGID_BODIES\n" + pad("wing", 1) + pad(3), ["part 1"]),
+        ("*CONSTRAINED_RIGID_BODY_STOPPERS\n" + pad(1, 2), []),
+    ],
+)
+def test_only_switched_parts_of_merged_rigid_bodies_are_reported(
+    tmp_path: Path, keyword: str, named: list[str]
+) -> None:
+    findings = find_constraint_findings(tmp_path, keyword, MERGED)
+    assert [finding.rule for finding in findings] == ["D2R122"] * len(named)
+    for finding, parts in zip(findings, named, strict=True):
+        assert finding.message.startswith(f"{parts} ")

@@ -21,6 +21,7 @@ from d2rpick.api.arguments import read_windows
 from d2rpick.api.drives import Driving
 from d2rpick.base.errors import D2RPickError
 from d2rpick.histories.opening import open_run
+from d2rpick.report.drive import describe_progress
 from d2rpick.running import engine
 from d2rpick.running.sequence import (
     LOAD,
@@ -140,7 +141,7 @@ def test_a_run_is_rigid_in_its_flight_and_comes_to_its_end(
     )  # restart files of the starter, and those that may still be needed
     result = run(*prepare_drive(folder, "--resume", "-q", "-f", "table")).stdout
     assert "switched" in result
-    assert "no level at td is matched" in result
+    assert "tr is not matched to the energy at td" in result
     assert "--resume" in read_refusal(*prepare_drive(folder))
     over = run(*prepare_drive(folder, "--resume"))
     assert (
@@ -394,9 +395,12 @@ def test_how_far_a_run_is_can_be_told_at_any_time(tmp_path: Path) -> None:
         starter=give_solver_command("starter"),
         engine=give_solver_command("engine"),
     ).driver(resume=False) as driver:
-        assert driver.progress(3.4) == "starting ... 3 s"
+        assert describe_progress(driver, 3.4) == "starting ... 3 s"
         driver.at = Order(RIGID, 2, 0.05, 0.2)
-        assert driver.progress(9.0) == f"engine run 2, rigid: 0.05 to 0.2 of {END:g}"
+        assert (
+            describe_progress(driver, 9.0)
+            == f"engine run 2, rigid: 0.05 to 0.2 of {END:g}"
+        )
 
 
 @pytest.mark.parametrize(
@@ -570,7 +574,9 @@ def test_what_a_run_lacks_is_told_before_anything_is_computed(
     assert message in read_refusal(*words, *options)
     assert not (tmp_path / "run").exists()
     if "--engine" in options:
-        assert "missing   /no/such/engine" in run(*words, *options, "--dry-run").stdout
+        planned = run(*words, *options, "--dry-run")
+        assert planned.exit_code == 1
+        assert "there is no program '/no/such/engine'" in planned.stdout
     else:
         assert message in read_refusal(*words, *options, "--dry-run")
 

@@ -64,7 +64,7 @@ def test_of_two_parts_the_most_that_the_heavy_one_may_be_off_is_told(
     )
     assert first_swing.name == "block"
     assert first_swing.error == pytest.approx(2 * swings, abs=1e-5)
-    assert "at most" in first_swing.told
+    assert "at most" in first_swing.warning
 
 
 def test_nothing_is_said_where_no_momenta_of_parts_tell() -> None:

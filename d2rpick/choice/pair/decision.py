@@ -8,8 +8,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.choice.pair.aftermath import bound_mean_energy
-from d2rpick.choice.pair.grades import GOOD, GRADES, POOR, VERDICTS
+from d2rpick.choice.pair.aftermath import MeanEnergyBounds, bound_mean_energy
+from d2rpick.choice.pair.grades import (
+    GOOD,
+    GRADES,
+    MIN_MEAN_ENERGY,
+    POOR,
+    VERDICTS,
+    format_residual,
+)
 from d2rpick.choice.pair.quality import (
     CHOOSE_TIMES_IN_FLIGHT,
     MOST_WORTH_OF_FAIR,
@@ -20,7 +27,6 @@ from d2rpick.vibration.measures import wrong_sign
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from d2rpick.choice.pair.aftermath import MeanEnergyBounds
     from d2rpick.choice.pair.candidates import Candidate, Pair
     from d2rpick.choice.pair.quality import Cause, Quality
     from d2rpick.choice.pair.situation import Situation
@@ -155,12 +161,25 @@ class Decision(NamedTuple):
             return "the same as in the reference run: nothing vibrates in the flight up to td"
         parts = []
         if self.mean_energy_bounds is not None:
+            bounds = format_bounds(self.mean_energy_bounds)
             parts.append(
-                f"mean energy after td {format_bounds(self.mean_energy_bounds)} of the reference run"
+                f"mean energy after td {bounds} of the reference run{self._name_exceeded_limits()}"
             )
         if self.residual is not None:
-            parts.append(f"vibration wrong by {self.residual:.1%}")
+            parts.append(
+                f"vibration wrong by {format_residual(self.residual)} (residual {self.residual:.3f})"
+            )
         return ", ".join(parts) or "unknown: no model of the vibration fits the record"
+
+    def _name_exceeded_limits(self) -> str:
+        """Name the limits of a comparison that a switched run with a usable pair may exceed; empty if it cannot."""
+        if self.grade == POOR or self.is_compared or self.mean_energy_bounds is None:
+            return ""
+        limits = MeanEnergyBounds(MIN_MEAN_ENERGY, 2 - MIN_MEAN_ENERGY)
+        low, high = self.mean_energy_bounds
+        if limits.low <= low and high <= limits.high:
+            return ""
+        return f" (d2rpick verify accepts {format_bounds(limits)} of a switched run)"
 
     @property
     def worst_case(self) -> str:
@@ -168,11 +187,11 @@ class Decision(NamedTuple):
         if self.at_rest:
             return "the same"
         if self.residual is None:
-            text = f"vibration wrong by {self.worst_residual:.0%}"
+            text = f"vibration wrong by {format_residual(self.worst_residual)}"
             return f"{text}, if the deformation at tr is opposite to that at td"
         if self.worst_residual - self.residual <= _ALIKE:
             return "the same"
-        return f"vibration wrong by {self.worst_residual:.0%}"
+        return f"vibration wrong by {format_residual(self.worst_residual)}"
 
     @property
     def cure(self) -> str:
@@ -261,7 +280,9 @@ def _find_worst_residual(situation: Situation, candidate: Candidate) -> float:
 def _explain_why_good(quality: Quality, residual: float | None) -> str:
     """Explain why a pair is good: it preserves the vibration, or the error of its vibration hardly matters."""
     if quality.alone.grade == GOOD:
-        error = "" if residual is None else f" with an error of {residual:.1%}"
+        error = (
+            "" if residual is None else f" with an error of {format_residual(residual)}"
+        )
         return f"the flight is certain, and the vibration after td is kept{error}"
     return f"{'; '.join(quality.alone.reasons)}{_explain_raised_grade(quality)}"
 
@@ -271,7 +292,8 @@ def _explain_raised_grade(quality: Quality) -> str:
     if quality.worth is None or quality.alone.grade == quality.vibration.grade:
         return ""
     share = quality.worth.share
-    return f", but the energy of this error is at most {share:.2%} of the energy of the next contact"
+    advice = ": use only the motion" if quality.alone.grade == POOR else ""
+    return f", but the energy of this error is at most {share:.2%} of the energy of the next contact{advice}"
 
 
 def format_bounds(bounds: MeanEnergyBounds) -> str:
@@ -285,4 +307,4 @@ def _describe_pair(pair: Pair) -> str:
     times = f"tr = {pair.tr:.6g}, td = {pair.td:.6g}"
     if pair.residual is None:
         return times
-    return f"{times}: vibration wrong by {pair.residual:.1%}"
+    return f"{times}: vibration wrong by {format_residual(pair.residual)}"

@@ -14,3 +14,19 @@ USE: Final = "use"
 USE_WITH_CARE: Final = "use with care"
 DO_NOT_USE: Final = "do not use"
 VERDICTS: Final = {POOR: DO_NOT_USE, FAIR: USE_WITH_CARE, GOOD: USE}
+
+# From this residual on, a tenth of a per cent is noise in a sentence [-].
+_COARSE: Final = 0.1
+# Smallest accepted mean energy after td, relative to the reference run; well-switched computed runs had at least 0.77.
+MIN_MEAN_ENERGY: Final = 0.7
+
+
+def format_residual(residual: float) -> str:
+    """Format a residual for a sentence, in per cent.
+
+    Examples
+    --------
+    >>> format_residual(0.603), format_residual(0.039), format_residual(2e-5)
+    ('60%', '3.9%', '0.0%')
+    """
+    return f"{residual:.0%}" if residual >= _COARSE else f"{residual:.1%}"

@@ -12,7 +12,7 @@ from d2rpick.base.memory import remember
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.choice.pair.aftermath import compare_error_with_contact
 from d2rpick.choice.pair.candidates import Candidates, judge_candidates
-from d2rpick.choice.pair.grades import FAIR, GOOD, GRADES, POOR
+from d2rpick.choice.pair.grades import FAIR, GOOD, GRADES, POOR, format_residual
 from d2rpick.choice.pair.warnings import (
     POOR_KINETIC_SHARE,
     POOR_RESIDUAL,
@@ -521,13 +521,13 @@ def _describe_wrong_tr(
     """Return the cause that tr does not match td if the best tr at this td is clearly better; otherwise None."""
     if best_residual is None or residual - best_residual <= EQUALLY_GOOD:
         return None
-    reason = f"the vibration after td is wrong by {residual:.0%}, because tr does not match td"
+    reason = f"the vibration after td is wrong by {format_residual(residual)}, because tr does not match td"
     ratio = candidate.level_ratio
     if ratio is not None and abs(ratio - 1) > LIKE_LEVELS:
         reason += f": the energy at tr is {ratio:.3g} times that at td"
     elif candidate.sign_match is False:
         reason += ": the deformation has the opposite direction"
-    best = f"the best tr at this td is wrong by {best_residual:.0%}"
+    best = f"the best tr at this td is wrong by {format_residual(best_residual)}"
     return Cause(
         f"{reason}; {best}",
         "use d2rpick suggest with this td to find a better tr",
@@ -537,8 +537,8 @@ def _describe_wrong_tr(
 
 
 def _describe_wrong_vibration(situation: Situation, residual: float) -> Cause:
-    """Return the cause that the vibration after td is wrong; the cure is another tr or td."""
-    reason = f"the vibration after td is wrong by {residual:.0%}"
+    """Return the cause "the vibration after td is wrong"; its cure is another tr or td."""
+    reason = f"the vibration after td is wrong by {format_residual(residual)}"
     share = situation.kinetic_share
     if share is None or share <= POOR_KINETIC_SHARE:
         return Cause(
@@ -604,27 +604,32 @@ def _list_causes_for_fair(situation: Situation, best: Candidate) -> list[Cause]:
     """Return the causes of the vibration grade "fair"."""
     if best.residual is None:
         return []
+    low = best.residual if best.residual_low is None else best.residual_low
     high = best.residual_high or best.residual
     causes = []
-    if best.residual > MOST_GOOD:
-        worst_text = f", or {high:.0%} at worst" if high > _MOST_HIDDEN else ""
+    is_vague = high > _MOST_HIDDEN
+    # A residual that is stated above the limit, but may be below it by its band, does not make a pair worse than good.
+    is_wrong = best.residual > MOST_GOOD and (is_vague or low > MOST_GOOD)
+    if is_wrong:
+        worst_text = f", or {format_residual(high)} at worst" if is_vague else ""
         causes.append(
             Cause(
-                f"the vibration after td is wrong by {best.residual:.0%}{worst_text}",
+                f"the vibration after td is wrong by {format_residual(best.residual)}{worst_text}",
                 "use d2rpick explore to see whether another td is better",
                 needs_other_times=True,
                 kind=f"{_WRONG_BY_MORE} {MOST_GOOD:.0%}",
             )
         )
-    elif high > _MOST_HIDDEN:
+    elif is_vague:
         causes.append(
             Cause(
-                f"the vibration after td may be wrong by up to {high:.0%}, because the record may hide a further mode",
+                f"the vibration after td may be wrong by up to {format_residual(high)}, because the record may hide a "
+                "further mode",
                 _describe_cure_for_modes(situation),
                 kind="the record may hide a further mode",
             )
         )
-    if best.residual <= MOST_GOOD and _is_loose(best):
+    if not is_wrong and _is_loose(best):
         reach = (best.tr_high or best.tr) - best.tr
         causes.append(
             Cause(

@@ -286,7 +286,7 @@ def _compute_errors(situation: Situation, times: Samples) -> Samples:
     )
 
 
-def _is_inside(times: Samples, windows: Samples) -> Samples:
+def _is_inside(times: Samples, windows: Samples) -> NDArray[np.bool_]:
     """Return an array that is True for each time that lies in one of the windows."""
     window = np.searchsorted(windows[:, 0], times, side="right") - 1
     return np.asarray((window >= 0) & (times <= windows[window, 1]))

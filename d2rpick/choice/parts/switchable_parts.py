@@ -433,9 +433,9 @@ def _list_remarks_on_switch(
         yield "rigid in the deck, but has internal energy in the history"
     if row.flight and row.flight.deforms is not None:
         yield (
-            "flies and still vibrates, so tr matters"
+            "flies, so it can be rigid; vibrates, so its energy at tr must match td"
             if row.flight.deforms
-            else "flies and no longer vibrates"
+            else "flies, so it can be rigid; no longer vibrates, so any tr fits"
         )
     if data and data.section.formulations.keys() & {
         "solid",

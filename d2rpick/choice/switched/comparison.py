@@ -175,9 +175,10 @@ def compare_runs(
     energy_rigid = after.reported_while_rigid
     if energy_rigid is not None:
         reported = f"the solver reports an energy of {energy_rigid:.6g} while the parts are rigid"
+        if frozen > 0:
+            reported += f", {energy_rigid / frozen:.4g} times the energy right after td, {frozen:.6g}"
         notes.append(
-            f"{reported}; it is not used, because some solvers report wrong energies of rigid solid elements; "
-            f"right after td the energy is {frozen:.6g}"
+            f"{reported}; this is a fault of some solvers for rigid solid elements, and the value is not used"
         )
     error = _compute_relative_distance(*momenta, td, after.end)
     limit = _find_limit_of_change(reference, switched, tr, td)
@@ -401,9 +402,9 @@ def _check_mean_energy(share: float, min_mean: float) -> Iterator[str]:
     """Yield an objection if the mean energy after td differs from that of the reference run."""
     if not min_mean <= share <= 2 - min_mean:
         mean_text = (
-            f"the mean energy after td is {share:.2g} times that of the reference run"
+            f"the mean energy after td is {share:.0%} of that of the reference run"
         )
-        yield f"{mean_text}, {min_mean:g} to {2 - min_mean:g} were expected (`min_mean_energy`)"
+        yield f"{mean_text}, {100 * min_mean:g}% to {100 * (2 - min_mean):g}% were expected (`min_mean_energy`)"
 
 
 def _check_momentum(error: float | None) -> Iterator[str]:
