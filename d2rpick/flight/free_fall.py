@@ -460,7 +460,7 @@ class FreeFall(Law):
         return self._fitted(first, last)[2]
 
     def limit_damping(self, first: int, last: int) -> float:
-        """Return the largest alpha between two states that is damping [1/time]; a load slows the parts down more."""
+        """Return the largest damping rate alpha between two states [1/time] that is not attributed to a load."""
         length = float(self.time[last] - self.time[first])
         return max(_DAMPED, _SHOWN * (last - first)) / length
 
