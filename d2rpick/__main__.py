@@ -5,7 +5,7 @@ import os
 import signal
 import sys
 
-_SOON = 0.01  # time until an interrupt that was swallowed is repeated [s]
+_SOON = 0.05  # time until an interrupt that was swallowed is repeated [s]
 _PATIENCE = 2.0  # longest wait for other threads at the end of an interrupted run [s]
 
 
@@ -33,10 +33,10 @@ def main() -> None:
     def interrupt_again(ignored: "sys.UnraisableHookArgs") -> None:
         """Repeat an interrupt that is swallowed while an object is deleted; print no traceback of it."""
         if ignored.exc_type is KeyboardInterrupt:
-            from threading import Timer
+            from _thread import start_new_thread
 
-            # Raised here, it would be swallowed again.
-            Timer(_SOON, os.kill, (os.getpid(), signal.SIGINT)).start()
+            # Raised here, it would be swallowed again. A Thread or Timer is not used, because its start waits for it.
+            start_new_thread(_interrupt_soon, ())
 
     # A background job has another handler, because it ignores interrupts.
     is_interruptible = signal.getsignal(signal.SIGINT) is signal.default_int_handler
@@ -62,6 +62,14 @@ def main() -> None:
             sys.excepthook = lambda *_: None
             _limit_waiting()
             raise KeyboardInterrupt
+
+
+def _interrupt_soon() -> None:
+    """Send the interrupt to this process again after a while."""
+    import time
+
+    time.sleep(_SOON)
+    os.kill(os.getpid(), signal.SIGINT)
 
 
 def _limit_waiting() -> None:
