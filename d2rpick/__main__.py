@@ -73,7 +73,7 @@ def _interrupt_soon() -> None:
 
 
 def _limit_waiting() -> None:
-    """End this process by SIGINT after a while, even if one of its threads does not end.
+    """End this process by SIGINT after some time, even if one of its threads does not end.
 
     Python waits for the threads of a process pool before it ends. The processes of the pool have been interrupted too,
     at any point of their work.
