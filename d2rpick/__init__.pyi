@@ -33,7 +33,7 @@ from d2rpick.base.errors import (
     RangeError as RangeError,
 )
 from d2rpick.choice.parts.cost import Weights as Weights
-from d2rpick.running.events import Event as Event
+from d2rpick.report.follow import Event as Event
 from d2rpick.vibration.oscillator import Oscillator as Oscillator
 
 __all__: list[str]

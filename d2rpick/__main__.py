@@ -6,6 +6,7 @@ import signal
 import sys
 
 _SOON = 0.01  # time until an interrupt that was swallowed is repeated [s]
+_PATIENCE = 2.0  # longest wait for other threads at the end of an interrupted run [s]
 
 
 def main() -> None:
@@ -18,7 +19,8 @@ def main() -> None:
     of the time of a run with an ordinary file.
 
     An interrupt is raised as KeyboardInterrupt, without a traceback, so that Python ends itself by SIGINT. A shell then
-    ends its loop. It would continue its loop after a program that catches the signal and returns an exit code.
+    ends its loop. It would continue its loop after a program that catches the signal and returns an exit code. Until
+    the command begins, the signal ends the process by itself, because there is nothing to finish.
     """
     interrupts: list[int] = []
 
@@ -36,15 +38,18 @@ def main() -> None:
             # Raised here, it would be swallowed again.
             Timer(_SOON, os.kill, (os.getpid(), signal.SIGINT)).start()
 
+    # A background job has another handler, because it ignores interrupts.
+    is_interruptible = signal.getsignal(signal.SIGINT) is signal.default_int_handler
     try:
-        # A background job has another handler, because it ignores interrupts.
-        if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
-            signal.signal(signal.SIGINT, interrupt)
+        if is_interruptible:
+            signal.signal(signal.SIGINT, signal.SIG_DFL)
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
         gc.set_threshold(100_000)
         _fill_closed_streams()
         from d2rpick.cli import d2rpick
 
+        if is_interruptible:
+            signal.signal(signal.SIGINT, interrupt)
         d2rpick()
     except KeyboardInterrupt:
         interrupts.append(signal.SIGINT)
@@ -55,7 +60,22 @@ def main() -> None:
         gc.freeze()  # The system frees the memory anyway.
         if interrupts:
             sys.excepthook = lambda *_: None
+            _limit_waiting()
             raise KeyboardInterrupt
+
+
+def _limit_waiting() -> None:
+    """End this process by SIGINT after a while, even if one of its threads does not end.
+
+    Python waits for the threads of a process pool before it ends. The processes of the pool have been interrupted too,
+    at any point of their work.
+    """
+    if os.name == "posix":
+        from threading import Timer
+
+        watch = Timer(_PATIENCE, os.kill, (os.getpid(), signal.SIGINT))
+        watch.daemon = True
+        watch.start()
 
 
 def _fill_closed_streams() -> None:

@@ -1,4 +1,4 @@
-"""pytest plugin that fails any test which reads files outside the repository.
+"""Plugin for pytest that fails any test that reads files outside the repository.
 
 A test fails if it opens a file outside the repository, lists a folder there, or passes such a name to a child process,
 even if it catches the error.  Tests in tests/real have the marker ``real`` and are exempt; they are skipped if their

@@ -40,9 +40,9 @@ from tests.made_d3plot import D3plotWriter, make_states
 from tests.reading import list_states, open_contents
 from tests.relations import RELATIONS, check_relation
 
-_CHUNK: Final = 200  # inputs for each task
-_FEW: Final = 20  # histories for each task of a relation; each is read and asked twice
-_SHOWN: Final = 5  # faults printed for each format
+_CHUNK: Final = 200  # inputs per task
+_FEW: Final = 20  # histories per task of a relation; each is read and judged twice
+_SHOWN: Final = 5  # faults that are printed per format
 _KINDS: Final = ("flip", "cut", "drop", "double", "swap", "insert", "blank")
 _LIKELY: Final = b"\n 0123456789.,;E+-*eND\"'\x00\x1b\xff"
 _NUMBER: Final = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?")
@@ -53,7 +53,7 @@ _CSV: Final = b"time,internal_energy,kinetic_energy\n" + b"".join(
 
 
 def draw_faults(random: Random) -> list[Fault]:
-    """Draw one to three faults at random places of a file."""
+    """Draw one to three faults at random places in a file."""
     return [
         (
             random.choice(_KINDS),
@@ -103,7 +103,7 @@ def curves(random: Random) -> bool:
 
 
 def hdf5(random: Random) -> bool:
-    """Damage an HDF5 file; return True if it could be read. Its numbers carry no mark, so they are not checked."""
+    """Damage an HDF5 file; return True if it could be read. Its numbers are not marked, so they are not checked."""
     data = damage(_hdf5(), draw_faults(random), [])
     return bool(_read(lambda: open_contents(hdf5_file, data).history(Selection())))
 
@@ -156,7 +156,7 @@ def companions(random: Random) -> bool:
 
 
 def settings(random: Random) -> bool:
-    """Give a setting a value of any type of TOML; return True if it was taken."""
+    """Give a setting a value of any TOML type; return True if it was accepted."""
     command = random.choice([*COMMANDS])
     key = random.choice(list_options(command))
     value = draw_toml_value(random, depth=2)
@@ -166,7 +166,7 @@ def settings(random: Random) -> bool:
 
 
 def draw_toml_value(random: Random, depth: int) -> str:
-    """Draw a value of any type of TOML, with arrays and tables up to this ``depth``."""
+    """Draw a value of any TOML type, with arrays and tables up to this ``depth``."""
     kind = random.choice(("text", "whole", "real", "time", "word", "array", "table"))
     if kind in ("array", "table") and depth:
         inner = [draw_toml_value(random, depth - 1) for _ in range(random.randrange(4))]
@@ -209,7 +209,7 @@ def find_outcome(check: Callable[[Random], bool], random: Random, number: int) -
         warnings.simplefilter("error")
         try:
             return "read" if check(random) else "refused"
-        except Exception as error:  # noqa: BLE001  whatever it is, it is a fault
+        except Exception as error:  # noqa: BLE001  any exception is a fault
             return f"number {number}: {type(error).__name__}: {' '.join(str(error).split())[:150]}"
 
 

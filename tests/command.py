@@ -18,7 +18,7 @@ from click.testing import CliRunner, Result
 
 from d2rpick.cli import d2rpick
 
-TIME_LIMIT = 60  # a child process that takes longer is ended [s]
+TIME_LIMIT = 60  # a child process that takes longer is stopped [s]
 ROOT = Path(__file__).resolve().parents[1]
 ENERGY = str(ROOT / "sample_data" / "energy.csv")
 GLSTAT = str(ROOT / "sample_data" / "energy.glstat")
@@ -35,7 +35,7 @@ INTERRUPTIBLE = (
     "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\nfrom "
     "d2rpick.__main__ import main; main()"
 )
-# Environment without colour variables and without options of d2rpick that a developer may have set.
+# Environment without colour variables, and without options of d2rpick that a developer may have set.
 _ENVIRONMENT = {
     "NO_COLOR": None,
     "FORCE_COLOR": None,
@@ -90,7 +90,7 @@ def put(path: Path, content: str | bytes) -> Path:
 
 
 def read_refusal(*args: str) -> str:
-    """Return the error message of a command that failed; it must be one line on stderr and the only output."""
+    """Return the error message of a failed command, which must be one line on stderr and the only output."""
     result = run(*args)
     assert (result.exit_code, result.stdout) == (2, ""), result.stderr
     assert result.stderr.count("\n") == 1
@@ -99,7 +99,7 @@ def read_refusal(*args: str) -> str:
 
 
 def _is_temporary(path: Path) -> bool:
-    """Return True if a file may change: it is in a temporary folder, not in the repository."""
+    """Return True if a file may change, i.e. is in a temporary folder and not in the repository."""
     path = Path(os.path.normpath(path))
     return not path.is_relative_to(ROOT) and (
         path == _TEMPORARY or _TEMPORARY in path.parents
@@ -113,7 +113,7 @@ def join_wrapped_lines(text: str) -> str:
 
 @contextmanager
 def start_program(*args: str, **options: Any) -> Iterator[subprocess.Popen[Any]]:
-    """Start the program in a session of its own, and end it after the block or the time limit.
+    """Start the program in its own session, and stop it after the block or the time limit.
 
     It can be interrupted even if this process cannot, for example in the background of a shell.
     """
@@ -140,7 +140,7 @@ def _end_group(group: int) -> None:
 
 
 def run_json(*args: str) -> dict[str, Any]:
-    """Run a command with JSON output and return the document; exit code 1 (problems found) is allowed."""
+    """Run a command with JSON output, and return the document; exit code 1 (problems found) is allowed."""
     result = run(*args, "-f", "json")
     assert result.exit_code in (0, 1), result.stderr
     document: dict[str, Any] = json.loads(result.stdout)

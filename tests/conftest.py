@@ -1,4 +1,4 @@
-"""Settings for all tests of a process, made before any test module is imported."""
+"""Settings for all tests of a process, which are made before any test module is imported."""
 
 import gc
 import os
@@ -19,7 +19,7 @@ from hypothesis import settings
 
 from d2rpick.base.workers import count_cores
 
-# A busy machine is no error, so there is no deadline.
+# A busy machine is not an error, so there is no deadline.
 # A commit must pass or fail in the same way each time, so the examples of a test are the same in each run.
 settings.register_profile(
     "d2rpick", deadline=None, max_examples=20, derandomize=True, database=None
@@ -28,7 +28,7 @@ settings.register_profile(
 settings.register_profile("search", deadline=None, max_examples=100)
 settings.load_profile("d2rpick")
 
-# Workers must not compile the tests again either.
+# Nor must workers compile the tests again.
 sys.dont_write_bytecode = False
 
 
@@ -45,7 +45,7 @@ def _old_files() -> Iterator[None]:
 
 @pytest.fixture
 def new_files(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Show files with their true age, but do not pause: nothing else writes the files of these tests."""
+    """Show files with their true age, but do not pause, because nothing else writes the files of these tests."""
     monkeypatch.setattr(time, "time_ns", _now)
     monkeypatch.setattr(time, "sleep", lambda _: None)
 
@@ -75,15 +75,15 @@ gc.set_threshold(20_000, 20, 50)
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers() -> int:
-    """Use one worker per core: a worker that waits for a child process leaves its core to the child."""
+    """Use one worker per core; a worker that waits for a child process leaves its core to the child."""
     return count_cores()
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Run the slow folder first; at the end, one worker would wait for the other."""
+    """Run the slow folder first; otherwise, one worker would wait for the other at the end."""
     items.sort(key=lambda item: not item.nodeid.startswith("tests/vibration/"))
 
 
 def pytest_collection_finish() -> None:
-    """Exclude the modules and the collected tests from garbage collection; they are needed to the end."""
+    """Exclude the modules and the collected tests from garbage collection, because they are needed to the end."""
     gc.freeze()

@@ -1,4 +1,4 @@
-"""Files of records to be damaged. Each number identifies its variable, state and part: a shifted one is noticed."""
+"""Files of records to be damaged. Each number identifies its variable, state and part, so a shifted one is noticed."""
 
 import tracemalloc
 from collections.abc import Callable, Iterator
@@ -130,7 +130,7 @@ def limit_memory() -> Iterator[None]:
 
 @dataclass
 class Damaged:
-    """File to be damaged: ``per_state`` records make a state, or 1 if each state says how many records it has."""
+    """File to be damaged. A state has ``per_state`` records; 1 if each state gives the number of its records."""
 
     made: LsdaWriter | T01Writer
     true: Callable[[bytes], list[tuple[int, bool]]]

@@ -63,7 +63,7 @@ def forget(history: History) -> History:
 
 
 def count_fits(history: History) -> int:
-    """Return the number of fits that were computed for a record, rather than remembered."""
+    """Return the number of fits that were computed for a record rather than taken from its memory."""
     functions = (function for function, *_ in history.memory.results)
     return sum(
         function.__module__.startswith("d2rpick.vibration") for function in functions

@@ -1,4 +1,4 @@
-"""Damage files, and read damaged texts line by line to know which numbers they contain.
+"""Damage files, and read damaged texts line by line to determine the numbers in them.
 
 With ``D2RPICK_THOROUGH=20`` the damage tests run 20 times as many cases, and the exhaustive tests run all of them.
 """
@@ -45,7 +45,7 @@ def choose_some(items: Sequence[Item], step: int = 97) -> Sequence[Item]:
 
 
 def list_cuts(text: bytes) -> list[int]:
-    """Return offsets to cut a text at: near all line ends and some between; every offset in a thorough run."""
+    """Return offsets at which to cut a text: near all line ends, and some between; every offset in a thorough run."""
     ends = {
         line_end.end() + shift
         for line_end in re.finditer(rb"\n|$", text)
@@ -54,7 +54,7 @@ def list_cuts(text: bytes) -> list[int]:
     return sorted({*choose_some(range(len(text)), 7), *ends} & {*range(len(text) + 1)})
 
 
-# A fault: its kind, its start and its size (as shares of the file), and the byte it writes.
+# A fault: its kind, its start and size (as fractions of the file), and the byte that it writes.
 Fault = tuple[str, float, float, int]
 State = tuple[
     float | None, list[float | None]

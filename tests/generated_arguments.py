@@ -1,4 +1,4 @@
-"""The keyword arguments of Python for the options of a choice, generated from their table.
+"""The keyword arguments of Python for the options of a choice, generated from the table of these options.
 
 A type checker and an editor read types from the text of a module, so the module is written: ``python -m
 tests.generated_arguments``.
@@ -41,7 +41,7 @@ OF_PYTHON = {
 
 
 def describe_argument(name: str) -> str:
-    """Return what an argument means, from the help of its option."""
+    """Return the meaning of an argument from the help of its option."""
     meaning = list_options(ChoiceOptions)[name].help.rstrip(".")
     meaning = re.sub(r"\.\s+\[(default: .*)\]$", r" (\1)", meaning)
     default = getattr(Request, name)

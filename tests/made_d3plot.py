@@ -52,7 +52,7 @@ class State:
 
 
 def make_states(times: Sequence[float], parts: int = 2, walls: int = 0) -> list[State]:
-    """Make states whose values all differ."""
+    """Make states whose values are all different."""
     states_made = []
     for number, time in enumerate(times, start=1):
         part_values = np.arange(1, parts + 1)

@@ -1,7 +1,7 @@
-"""The indexes of the frequently asked questions: each question with a link, and the bold text that begins its answer.
+"""The indexes of the frequently asked questions: each question with a link, and the bold text of its answer.
 
-``python -m tests.questions`` writes them to docs/how-to/faq.md (before the cards) and switched-faq.md (from the cards
-on), so that each can be scanned at a glance; a test holds them current.
+``python -m tests.questions`` writes them to docs/how-to/faq.md (planning a switch) and switched-faq.md (cards,
+switched run and CI), so that each can be scanned at a glance; a test holds them current.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 FOLDER: Final = ROOT / "docs" / "how-to"
 # Titles of the indexes, and labels of their pages, in the order of the lists.
 INDEXES: Final = {
-    "faq": "Frequently asked questions: before the cards",
-    "switched-faq": "Frequently asked questions: from the cards on",
+    "faq": "Frequently asked questions: planning a switch",
+    "switched-faq": "Frequently asked questions: cards, switched run and CI",
 }
 PAGES: Final = {
     "faq": {

@@ -71,7 +71,7 @@ def round_as_printed(values: Samples, digits: int = 6) -> Samples:
 
 
 def add_noise(values: Samples, share: float, seed: int) -> Samples:
-    """Return ``values`` with white noise whose standard deviation is ``share`` of their maximum."""
+    """Return ``values`` with white noise whose standard deviation is the fraction ``share`` of their maximum."""
     noise = np.random.default_rng(seed).standard_normal(values.size)
     return values + share * float(np.max(values)) * noise
 

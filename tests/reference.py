@@ -1,4 +1,4 @@
-"""The pages of the reference that follow from the code: commands, rules of ``check``, warnings, and keys of JSON.
+"""The reference pages that follow from the code: commands, rules of ``check``, warnings, and keys of JSON.
 
 ``python -m tests.reference`` writes them to docs/reference; a test holds them current.
 """
@@ -33,7 +33,7 @@ _WARNINGS_INTRODUCTION: Final = (
     "`d2rpick rule margin-kept` prints the same text. Each warning has a stable code. JSON lists the warnings of an "
     "answer under `warnings`."
 )
-# What a topic of the warnings says before its first warning.
+# Text of a warning topic before its first warning.
 _WARNINGS_TOPIC_INTRODUCTIONS: Final = {
     "Health of the run": "[Checks](checks.md#health-of-the-reference-run) lists the limits and their sources."
 }
@@ -51,7 +51,7 @@ _SOLVERS: Final = {"ls-dyna": "LS-DYNA", "radioss": "Radioss"}
 
 
 def cell(text: str) -> str:
-    """Write a text so that it fits a cell of a table."""
+    """Write a text in a form that fits a cell of a table."""
     one_line = " ".join(text.split())
     return re.sub(r"(?<!\\)\|", r"\|", one_line).replace("<", "&lt;")
 
@@ -63,7 +63,7 @@ def table(head: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> list[str]:
 
 
 def commands_page() -> str:
-    """Write the page of the commands: the options that all have, then each with its own."""
+    """Write the page of the commands: the options that all share, then each command with its own options."""
     contexts = [*_contexts()]
     options = [dict(_options(context)) for context in contexts]
     common = dict.fromkeys(options[0])
@@ -87,7 +87,7 @@ def commands_page() -> str:
 
 
 def _contexts() -> Iterator[click.Context]:
-    """Give the context of each command, in the order of the help."""
+    """Return the context of each command, in the order of the help."""
     root = click.Context(d2rpick, info_name="d2rpick", **d2rpick.context_settings)
     assert isinstance(d2rpick, click.Group)
     for name in COMMANDS:
@@ -97,7 +97,7 @@ def _contexts() -> Iterator[click.Context]:
 
 
 def _described(context: click.Context) -> Iterator[str]:
-    """Give the heading of a command, its usage and what it does."""
+    """Return the heading of a command, its usage and its description."""
     usage = " ".join(context.command.collect_usage_pieces(context))
     yield from (
         f"## {context.info_name}",
@@ -109,7 +109,7 @@ def _described(context: click.Context) -> Iterator[str]:
 
 
 def _options(context: click.Context) -> Iterator[tuple[str, str]]:
-    """Give the options of a command as its help shows them: names and value, and meaning."""
+    """Return the options of a command as its help shows them: names and value, and meaning."""
     for option in context.command.get_params(context):
         if isinstance(option, click.Option):
             record = option.get_help_record(context)
@@ -118,7 +118,7 @@ def _options(context: click.Context) -> Iterator[tuple[str, str]]:
 
 
 def _examples(epilog: str) -> Iterator[str]:
-    """Give the examples of a command as an indented block."""
+    """Return the examples of a command as an indented block."""
     lines = [line.strip() for line in epilog.splitlines()[1:] if line.strip()]
     if lines:
         yield from ("", "Examples:", "", *(f"    {line}" for line in lines))
@@ -180,7 +180,7 @@ def _keys(
     prefix: str,
     within: tuple[str, ...],
 ) -> Iterator[tuple[str, str, str]]:
-    """List the keys of an object and of the objects in it; what refers to itself is not followed again."""
+    """List the keys of an object and of the objects in it; recursive references are not followed again."""
     for key, given in schema.get("properties", {}).items():
         found, names = _resolved(given, defined)
         yield (
@@ -199,7 +199,7 @@ def _keys(
 def _resolved(
     schema: Mapping[str, Any], defined: Mapping[str, Any]
 ) -> tuple[Mapping[str, Any], tuple[str, ...]]:
-    """Follow a reference, also that of a choice between a definition and null; give the names on the way."""
+    """Follow a reference, including that of a choice between a definition and null; return the names on the way."""
     choices = [*schema.get("anyOf", ()), *schema.get("oneOf", ())]
     reference = schema.get("$ref") or next(
         (choice["$ref"] for choice in choices if "$ref" in choice), None
@@ -212,7 +212,7 @@ def _resolved(
 
 
 def _kind(schema: Mapping[str, Any]) -> str:
-    """Say what values a key has."""
+    """Describe the values of a key."""
     if "const" in schema:
         return f"`{schema['const']}`"
     if "enum" in schema:

@@ -1,4 +1,4 @@
-"""Twenty-one rollovers, fixed in advance: the recommendations compared with switched runs at every tr."""
+"""Twenty-one rollovers, fixed in advance, compare the recommendations with switched runs at every tr."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -22,7 +22,7 @@ from tests.energies import require
 T_END = 0.55
 # td is this much before the landing [s], rounded to 1 ms; as in the published study.
 BEFORE_LANDING = 0.010
-# Time after td over which the mean energy is taken, without the ground [s]: two periods of the lowest mode.
+# Time after td for the mean energy, without ground contact [s]: two periods of the lowest mode.
 MEAN_OVER = 0.1
 NO_GROUND = 50.0
 
@@ -75,12 +75,12 @@ class Rehearsal:
 
     @property
     def roll_share(self) -> float:
-        """Roll error of the recommended tr divided by the largest of the scan [-]."""
+        """Roll error of the recommended tr divided by the largest one in the scan [-]."""
         return self.error / self.worst
 
     @property
     def energy_off(self) -> float:
-        """Difference of the mean energy after td from the announced value [-]."""
+        """Difference between the mean energy after td and the announced value [-]."""
         return self.mean_ratio / self.announced - 1
 
 

@@ -40,7 +40,7 @@ _TEXTS: Final = {
 
 
 class MadeRun(NamedTuple):
-    """Run: times (n,), internal and kinetic energy of the part that vibrates, energy of another part, and td.
+    """Run: times (n,), internal and kinetic energy of the vibrating part, energy of another part, and td.
 
     ``states_per_period`` counts the states in a period of the energy of the fastest mode.
     """
@@ -56,7 +56,7 @@ class MadeRun(NamedTuple):
 
 
 class Asked(NamedTuple):
-    """Files of a run, and the choice asked of them."""
+    """Files of a run, and the choice that is requested for them."""
 
     names: list[str]
     td: float
@@ -104,7 +104,7 @@ class Chosen(NamedTuple):
     listed: tuple[float, ...] = ()
 
     def lists(self, tr: float, room: float) -> bool:
-        """Return True if a tr of the answer is this one within ``room`` [time]."""
+        """Return True if the answer has a tr within ``room`` of this one [time]."""
         return any(abs(tr - other) <= room for other in self.listed)
 
 
@@ -500,7 +500,7 @@ def choose(question: Asked) -> Chosen:
 
 
 def get_residual_width(candidate: Candidate) -> float:
-    """Return how far above its stated value the residual may lie."""
+    """Return by how much the residual may exceed its stated value."""
     return max((candidate.residual_high or 0.0) - (candidate.residual or 0.0), 0.0)
 
 
@@ -539,7 +539,7 @@ def find_difference(
 
 
 def _has_lost_first_state(relation: Relation, run: MadeRun, first: Chosen) -> bool:
-    """Return True if tr is so near the end of the load that no state before it may be left in the flight."""
+    """Return True if tr is so close to the end of the load that every state before it must be kept in the flight."""
     if not relation.may_lose or first.tr is None:
         return False
     return first.tr - run.load_end < 2 * float(run.time[1] - run.time[0])

@@ -1,4 +1,4 @@
-"""Damaged inputs of all formats are read or refused, a million with ``D2RPICK_THOROUGH=20``; answers follow changes."""
+"""Damaged inputs of all formats are read or refused, a million with ``D2RPICK_THOROUGH=20``; relations hold."""
 
 from collections import Counter
 from functools import partial

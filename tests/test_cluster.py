@@ -26,7 +26,7 @@ PATIENCE = 30.0  # longest wait for a cluster [s]
 
 
 def until(true: Callable[[], Any]) -> Any:
-    """Wait until ``true`` returns a true value, and return it."""
+    """Wait until ``true`` returns a true value, and return this value."""
     end = time.monotonic() + PATIENCE
     while time.monotonic() < end:
         if value := true():
@@ -90,7 +90,7 @@ def test_a_study_on_a_cluster_outlives_the_death_of_a_worker(tmp_path: Path) -> 
         run(*variants.STUDY, "-f", "json", *sources, sources[0]).stdout
     )
     slow, ledger = tmp_path / "slow.csv", tmp_path / "ledger.ndjson"
-    os.mkfifo(slow)  # whoever reads it waits
+    os.mkfifo(slow)  # the reader of the pipe waits
     with (
         cluster(tmp_path, ("one", "two")) as (address, workers),
         Client(address, set_as_default=False) as client,

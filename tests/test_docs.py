@@ -1,4 +1,4 @@
-"""The documentation is true: its examples run, its commands and links exist."""
+"""The documentation is true: its examples run, and its commands and links exist."""
 
 import doctest
 import re
@@ -34,7 +34,7 @@ from tests.examples import (
 README = read_page("README.md")
 ALL = "\n".join(read_page(page) for page in PAGES)
 MAP = "docs/README.md"
-LONGEST_README = 700  # words of prose that can be read in five minutes
+LONGEST_README = 700  # number of words of prose that can be read in five minutes
 # Each language has a test below, or shows nothing that can be run.
 KINDS = {"console", "pycon", "sh", "yaml", "toml", "mermaid", "text"}
 

@@ -1,4 +1,4 @@
-"""Messages speak as the glossary and the style guide ask: every text in the code, other than docstrings, is held."""
+"""Messages follow the glossary and the style guide: every text in the code except docstrings is checked."""
 
 import ast
 import re
@@ -12,7 +12,7 @@ from tests.test_words import BANNED, SYNONYMS
 
 MODULES = sorted((ROOT / "d2rpick").rglob("*.py"))
 FEWEST_WORDS = 3  # shorter texts are keys, names and headings
-# Names that only messages would use for what the glossary names.
+# Names used only in messages for things that have another name in the glossary.
 NAMES = SYNONYMS | {
     "CPU time": r"processor time",
     "kinetic fraction": r"kinetic share",
@@ -27,7 +27,7 @@ NAMES = SYNONYMS | {
 
 
 def list_texts(tree: ast.AST) -> Iterator[str]:
-    """Yield each text of a module that is no docstring, with ``...`` for what is inserted."""
+    """Yield each text of a module that is not a docstring, with ``...`` for inserted values."""
     statements = (node for node in ast.walk(tree) if isinstance(node, ast.Expr))
     docstrings = {id(statement.value) for statement in statements}
     formatted = [node for node in ast.walk(tree) if isinstance(node, ast.JoinedStr)]

@@ -1,4 +1,4 @@
-"""The pages of the reference are those that the code gives; every warning has its place."""
+"""The reference pages are those generated from the code, and every warning has its place."""
 
 import ast
 import re
@@ -27,7 +27,7 @@ def test_every_rule_has_an_anchor() -> None:
 
 
 def codes(tree: ast.Module) -> Iterator[str]:
-    """Codes of the warnings that a module issues, as far as they are written where it does so."""
+    """Codes of the warnings that a module issues, as far as they are written where they are issued."""
     for node in ast.walk(tree):
         if (
             isinstance(node, ast.Call)

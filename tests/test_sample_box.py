@@ -1,4 +1,4 @@
-"""The samples of the rollover box are the same run in every format, and the energies of each balance."""
+"""The samples of the rollover box are the same run in every format, and the energies of each are balanced."""
 
 from collections.abc import Mapping
 from pathlib import Path

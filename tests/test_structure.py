@@ -44,7 +44,7 @@ WRITES = re.compile(
     r"""\.(?:write_text|write_bytes|savefig|copyfile)\(|\bopen\([^)]*["']\w*[wax]\+?b?["']"""
 )
 SWAP = re.compile(r"\.(?:set|del)(?:attr|item)\b")
-# Modules of the standard library and of numpy that slow down the start and that an answer to a plain table does not
+# Modules of the standard library and of numpy that slow down the start, and that an answer to a plain table does not
 # need.
 UNNEEDED = {
     *(

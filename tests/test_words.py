@@ -1,4 +1,4 @@
-"""The pages speak as the style guide asks, as far as a program can tell."""
+"""The pages follow the style guide as far as a program can check this."""
 
 import re
 from collections.abc import Iterator
@@ -18,15 +18,15 @@ READ = [page for page in PAGES if page not in EXEMPT]
 REFERENCE = "docs/reference/"
 LONGEST_SENTENCE = 35  # [words]
 LONGEST_MEAN = 18  # [words]
-LONGEST_PAGE = 1_500  # [words], but of the reference
-# Words and phrases of the style guide; each has a plain one there.
+LONGEST_PAGE = 1_500  # [words], except in the reference
+# Words and phrases of the style guide, each of which has a plain alternative there.
 BANNED = re.compile(
     r"\b(?:put off|puts off|taken for granted|held against|hangs? together|by the deck|gets? told|(?:is|are) told|"
     r"tells? (?:of|that|which|when|how)|beside|is believed|best of a bad|"
     r"a (?:tenth|twentieth|fiftieth|hundredth|thousandth|two-hundredth))\b",
     re.IGNORECASE,
 )
-# Other names of things that the glossary names.
+# Other names for things that the glossary names.
 SYNONYMS = {
     "reference run": r"unswitched run|run without switching|reference history",
     "engine run, restart segment": r"\blegs?\b",

@@ -1,4 +1,4 @@
-"""Export the names that ``import d2rpick`` provides and that the commands use: questions about runs, and their answers.
+"""Export the names that ``import d2rpick`` provides and the commands use: questions about runs, and their answers.
 
 A name is imported when it is first used.  Type checkers and editors find the names in the stub
 ``d2rpick/__init__.pyi``.
@@ -20,7 +20,7 @@ _NAMES = {
     "api.running": "FirstRun first follow",
     "api.runs": "Run from_frame read",
     "api.studies": "Study study",
-    "running.events": "Event",
+    "report.follow": "Event",
     "vibration.oscillator": "Oscillator",
     "choice.parts.cost": "Weights",
 }

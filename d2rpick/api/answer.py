@@ -1,4 +1,4 @@
-"""Define what all answers have in common: JSON, table, page, and the command line that repeats the answer."""
+"""Define what all answers have in common: JSON, a table, a page, and the command line that repeats the answer."""
 
 from __future__ import annotations
 
@@ -36,21 +36,21 @@ class Answer:
     come from no file are written as ``<weights in memory>``.
     """
 
-    # Some answers store the command as a field, whereas others compute it as a property.
+    # Some answers store the command as a field; others compute it as a property.
     if TYPE_CHECKING:
 
         @property
         def command(self) -> tuple[str, ...]:
-            """The command line that gives the same answer; it begins with the name of the command."""
+            """The command line that gives the same answer, beginning with the name of the command."""
 
     cautions: tuple[Caution, ...]
     kind: ClassVar[str]  # Key of this type of answer in the table of output formats.
-    # Names of the attributes that ``repr`` of the answer shows.
+    # Names of the attributes that the ``repr`` of the answer shows.
     said: ClassVar[tuple[str, ...]] = ()
 
     @classmethod
     def of(cls, result: Any, **further_fields: Any) -> Self:
-        """Make the public answer from an internal result; ``cautions`` are appended to the cautions of the result."""
+        """Make the public answer from an internal result; ``cautions`` are appended to those of the result."""
         values = {field.name: getattr(result, field.name) for field in fields(result)}
         values["cautions"] = (*values["cautions"], *further_fields.pop("cautions", ()))
         return cls(**values, **further_fields)
@@ -153,7 +153,7 @@ class RunAnswer(Paged):
 
     @property
     def command(self) -> tuple[str, ...]:
-        """The command line that gives the same answer; it begins with the name of the command."""
+        """The command line that gives the same answer, beginning with the name of the command."""
         return (self.name, *self.times, *self.question.options)
 
     @classmethod
@@ -177,7 +177,7 @@ class RunAnswer(Paged):
         chosen: tuple[Situation, float] | None,
         explored: TradeOff | None,
     ) -> PageContext:
-        """Return what a page shows in addition to the answer, including the card for the chosen situation and tr."""
+        """Return what a page shows in addition to the answer, e.g. the card for the chosen situation and tr."""
         from d2rpick.report.page import PageContext
 
         context = PageContext(
@@ -210,7 +210,7 @@ class RunAnswer(Paged):
         return context._replace(card=card)
 
     def _explorer(self, trade_offs_or_none: Iterable[TradeOff | None]) -> Any:
-        """Return the interactive data of a page, and the command line that repeats the answer for any td."""
+        """Return the interactive data of a page, and the command line that repeats the answer for any given td."""
         from d2rpick.report.page import Explorer
 
         trade_offs = tuple(trade_off for trade_off in trade_offs_or_none if trade_off)
@@ -235,7 +235,7 @@ def write_page(path: arguments.Path, page: str) -> Path:
 def build_frame(
     rows: Sequence[Mapping[str, Any]], columns: Sequence[str], **attrs: Any
 ) -> pd.DataFrame:
-    """Return a table with one row per mapping; unknown values are NaN, even if a whole column is unknown.
+    """Return a table with one row per mapping. Unknown values are NaN, even if a whole column is unknown.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Check the arguments of Python functions before any file is opened; read windows from a file.
+"""Check the arguments of Python functions before a file is opened, and read windows from a file.
 
 A wrong argument raises a TypeError or ValueError that names it.
 """
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     # False means that no deck is used, even if there is one in the folder of the run.
     Deck = Path | Literal[False]
     Parts = str | int | Iterable[str | int]
-    # A number in the unit of the run, or a string with a unit, for example 64ms.
+    # A number in the unit of the run, or a string with a unit, e.g. 64ms.
     Time = float | str
 
 # Largest number of characters of a wrong value that are shown in a message.
@@ -56,7 +56,7 @@ def check_number(name: str, value: object, limits: Number = TIME) -> float:
 
 
 def is_number(value: object) -> bool:
-    """Return True for a Python or numpy number, also in a 0-dimensional array; False for True, text or complex."""
+    """Return True for a Python or numpy number, or a 0-dimensional array of one; False for True, text or complex."""
     kind = getattr(getattr(value, "dtype", None), "kind", "")
     if (
         isinstance(value, bool | str | bytes)
@@ -85,7 +85,7 @@ def _format_wrong_value(value: object) -> str:
 
 
 def check_flag(name: str, value: object, default: bool) -> bool:
-    """Return True or False, or the default for None; raise TypeError for anything else.
+    """Return True or False; None gives the default. Raise TypeError for anything else.
 
     Examples
     --------
@@ -126,7 +126,7 @@ def check_windows(name: str, value: object) -> list[tuple[float, float]]:
 
 
 def suggest_decimal_point(value: object) -> str:
-    """Explain how to write a number that was given with a decimal comma; return an empty string for other strings.
+    """Explain how to write a number that was given with a decimal comma; return "" for any other string.
 
     Examples
     --------
@@ -145,7 +145,7 @@ def suggest_decimal_point(value: object) -> str:
 
 
 def suggest_without_unit(value: object) -> str:
-    """Explain how to write a time that was given with a unit; return an empty string for other strings."""
+    """Explain how to write a time that was given with a unit; return "" for any other string."""
     from d2rpick.histories.digits import parse_seconds
 
     seconds = parse_seconds(str(value))
@@ -155,7 +155,7 @@ def suggest_without_unit(value: object) -> str:
 
 
 def suggest_without_percent(value: object, *, is_time: bool) -> str:
-    """Explain how to write a fraction or a time that was given in percent; return an empty string for other strings.
+    """Explain how to write a fraction or a time that was given in percent; return "" for any other string.
 
     Examples
     --------
@@ -244,7 +244,7 @@ def list_part_names(name: str, value: Parts | None) -> tuple[str, ...]:
 
 
 def list_rule_ids(name: str, value: str | Iterable[str] | None) -> tuple[str, ...]:
-    """Return the ids of rules, or prefixes of ids, as a tuple; a string is a single id.
+    """Return the ids or id prefixes of rules as a tuple; a string is a single id.
 
     Examples
     --------
@@ -339,7 +339,7 @@ def refuse_unknown(
 
 
 def check_option(name: str, value: object, option: Option, default: Any = None) -> Any:
-    """Return a value converted to the type of its option, or the default for None.
+    """Return a value converted to the type of its option; None gives the default.
 
     Examples
     --------
@@ -419,7 +419,7 @@ def _check_oscillator(value: object) -> Oscillator | None:
 
 
 def check_weights(value: object) -> Any:
-    """Return weights or the name of a file with weights; None if no weights are given."""
+    """Return weights or the name of a file with weights; None if none are given."""
     if value is None:
         return None
     if isinstance(value, str | os.PathLike):
@@ -456,7 +456,7 @@ def check_path(name: str, value: Path) -> str:
 
 
 def read_windows(text: str, source: str) -> tuple[tuple[float, float], ...]:
-    """Read windows from the output of ``d2rpick plan -f value``, which has a line ``tr td`` for each window.
+    """Read windows from the output of ``d2rpick plan -f value``, in which each line ``tr td`` is a window.
 
     The journal of a driven run is accepted too.
 
@@ -490,10 +490,10 @@ def read_windows(text: str, source: str) -> tuple[tuple[float, float], ...]:
 
 
 def _read_journal(text: str) -> list[tuple[float, float]]:
-    """Return the windows of the rigid restart segments in a journal; the last entry of each segment number is used."""
+    """Return the windows of the rigid restart segments in a journal; the last entry for each segment number is used."""
     import json  # Imported here to keep start-up fast.
 
-    # Each item is a restart segment: its number, True if it is rigid, its start and its end.
+    # Each item describes a restart segment: its number, True if it is rigid, its start and its end.
     legs: list[tuple[int, bool, float, float]] = []
     for line in text.splitlines():
         try:

@@ -1,4 +1,4 @@
-"""Turn a request into a question: open the run, select the energy, and add the settings and costs from the deck.
+"""Turn a request into a question: open the run, select the energy, and add the deck's settings and costs.
 
 The commands of one run and the Python functions use this; `d2rpick.choice.answers` computes the answer.
 """
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 
 class RunQuestion(NamedTuple):
-    """A question: the opened run, the selected energy, and the settings that determine how the run is judged.
+    """A question: the opened run, the selected energy, and the settings by which the run is judged.
 
     ``cautions`` name what the deck leaves unknown.  ``selection`` has the columns and parts, including those from the
     deck.  ``on_card`` are parts that only the card contains, ``merge`` the part into which all are merged there.
@@ -125,7 +125,7 @@ def make_request(
 
 
 def open_requested_run(request: Request, names: Sequence[str] = ()) -> Run:
-    """Open the run named in the request, or other files with the same options."""
+    """Open the run that the request names, or other files with the same options."""
     from d2rpick.api.runs import Run, find_folder
     from d2rpick.histories import opening
 
@@ -136,7 +136,7 @@ def open_requested_run(request: Request, names: Sequence[str] = ()) -> Run:
 
 
 def is_card_only(request: Request, run: histories.OpenedRun) -> bool:
-    """Return True if ``--part`` applies to the card only, because the history is a table without parts."""
+    """Return True if ``--part`` applies only to the card, because the history is a table without parts."""
     return bool(request.energy) or not run.parts
 
 
@@ -181,7 +181,7 @@ def ask_run(
     if card_alone and is_card_only(request, files):
         parts, selection = selection.parts, selection._replace(parts=())
     elif selection.parts:
-        request.selection()  # Raises an error if the user names both an energy and parts.
+        request.selection()  # An error is raised if the user names both an energy and parts.
     reference = Reference.of(files, selection)
     cautions: tuple[Caution, ...] = ()
     if model is not None:
@@ -206,7 +206,7 @@ def ask_run(
 
 
 def read_cost_model(request: Request) -> CostModel | None:
-    """Read the deck with its weights, or the weights alone; None if neither is requested.
+    """Read the deck with its weights, or only the weights; None if neither is requested.
 
     Raises
     ------
@@ -228,7 +228,7 @@ def read_cost_model(request: Request) -> CostModel | None:
 def complete_selection(
     run: histories.OpenedRun, selection: Selection, settings: Settings, model: CostModel
 ) -> Selection:
-    """Complete the selected parts with the recommended set, and with the springs of the deck that have energies.
+    """Add the recommended set, and the springs of the deck that have energies, to the selected parts.
 
     Raises
     ------
@@ -252,7 +252,7 @@ def complete_selection(
 
 
 def _check_recommended(request: Request, run: histories.OpenedRun) -> None:
-    """Refuse the recommended set if other parts are named too, or if there is no deck."""
+    """Refuse the recommended set if other parts are named as well, or if there is no deck."""
     if has_recommended(request.part, run.parts):
         if len(request.part) > 1:
             raise ArgumentError(
@@ -265,7 +265,7 @@ def _check_recommended(request: Request, run: histories.OpenedRun) -> None:
 
 
 def _merge_parts(question: RunQuestion, merge: int) -> RunQuestion:
-    """Treat the parts as one rigid body; add a caution if they are not connected."""
+    """Treat the parts as one rigid body, and add a caution if they are not connected."""
     from d2rpick.choice.parts.deck_of_run import merge_into_one_body
 
     parts = question.reference.history.parts

@@ -84,7 +84,7 @@ def list_solvers() -> Sequence[str]:
 
 
 def explain_unknown_solver(name: object) -> str:
-    """Return the message about a name that is not a solver, with the most similar solver name."""
+    """Return the message about a name that is not a solver, with the most similar name of a solver."""
     from d2rpick.histories.names import suggest_name
 
     solvers = list_solvers()
@@ -207,15 +207,19 @@ class Cards:
         """
         from d2rpick.deck.printing import find_solver
 
-        printing, notes = self._suit_deck(question)
         parts = parse_id_ranges("--part", question.on_card)
+        printing, notes = self._suit_deck(question, parts)
         printing = self.replace_in(printing, parts)
         history_format = question.reference.history.format
         self.check_solver(printing.solver or find_solver(history_format))
         return printing, notes
 
-    def _suit_deck(self, question: RunQuestion) -> tuple[Printing, tuple[str, ...]]:
-        """Return what the deck of the run requires of a card, and notes on rigid bodies that are missing from the deck.
+    def _suit_deck(
+        self, question: RunQuestion, parts_on_card: Sequence[int]
+    ) -> tuple[Printing, tuple[str, ...]]:
+        """Return what the deck of the run requires of a card, with notes on rigid bodies that the deck lacks.
+
+        ``parts_on_card`` are the parts to switch if the history has no parts.
 
         The deck gives the solver, the name and end of the run, ids that are free, the constraints that have to be
         deleted, and the rigid bodies that switch the parts.
@@ -229,7 +233,8 @@ class Cards:
         from d2rpick.deck.printing import SOLVERS
         from d2rpick.deck.suiting import find_suiting
 
-        parts = [part.id for part in question.reference.history.parts or ()]
+        history_parts = question.reference.history.parts or ()
+        parts = parts_on_card or [part.id for part in history_parts]
         suiting = find_suiting(deck, parts)
         solver = self.solver or suiting.solver
         printing = printing._replace(solver=solver)
@@ -256,7 +261,7 @@ class Cards:
         ), bodies.notes
 
 
-# Keys of the settings that apply to all commands; all other keys apply to the rules or to a single command.
+# Keys of the settings that apply to all commands. All other keys apply to the rules or to a single command.
 SETTINGS: Final = (*map(make_option_name, (*OPTIONS, *list_options(Cards))), "fail-on")
 
 
@@ -299,7 +304,7 @@ def parse_id_ranges(name: str, texts: Sequence[str]) -> list[int]:
 
 
 class JudgedCard(NamedTuple):
-    """A card, and a verdict on each of its new windows for the printed times; ``str`` returns the text of the card.
+    """A card with a verdict on each new window for the printed times; ``str`` returns the text of the card.
 
     ``card`` has ``text``, ``files`` by the names that the solver expects, ``windows`` as printed and ``notes``.
     ``cautions`` are the findings of `check` with the card in the deck of the run; if there is no deck, they name what
@@ -343,7 +348,7 @@ def judge_and_print(
     judge: Callable[[float, float], PairVerdict] | None = None,
     done: Sequence[Times] = (),
 ) -> JudgedCard:
-    """Print the card for windows, and judge their printed times as `verify` does, or by calling ``judge``.
+    """Print the card for windows, and judge their printed times as `verify` does or by a call of ``judge``.
 
     Raises
     ------
@@ -352,18 +357,12 @@ def judge_and_print(
     """
     from d2rpick.api.card_in_deck import collect_objections
     from d2rpick.choice.answers import verify_run
-    from d2rpick.choice.judged_card import (
-        add_deck_bodies,
-        complete_printing,
-        print_judged_card,
-    )
+    from d2rpick.choice.judged_card import complete_printing, print_judged_card
     from d2rpick.deck.printing import DEFAULT, SOLVERS
 
     reference = question.reference
     printing, notes = cards.complete(question)
-    printing = complete_printing(
-        add_deck_bodies(printing, question.settings), reference.history
-    )
+    printing = complete_printing(_add_bodies(printing, question), reference.history)
     judge = judge or partial(verify_run, reference, settings=question.settings)
     result = print_judged_card(windows, reference.history, judge, printing, done)
     solver = SOLVERS[printing.solver or DEFAULT]
@@ -378,8 +377,21 @@ def judge_and_print(
     return JudgedCard(card, verdicts, tuple(collect_objections(card, question, apart)))
 
 
+def _add_bodies(printing: Printing, question: RunQuestion) -> Printing:
+    """Add the rigid bodies that the parts of a card become according to the deck."""
+    from d2rpick.choice.judged_card import add_deck_bodies
+
+    settings = question.settings
+    if question.on_card and question.model and question.deck:
+        from d2rpick.choice.parts.deck_of_run import find_rigid_bodies
+
+        bodies = find_rigid_bodies(question.model.inventory, printing.part)
+        settings = replace(settings, bodies=bodies)
+    return add_deck_bodies(printing, settings)
+
+
 def collect_cautions(card: JudgedCard) -> tuple[Caution, ...]:
-    """Return the cautions of a card and of its verdicts, each once, with a caution for each verdict that fails."""
+    """Return the cautions of a card and of its verdicts, each only once, with one for each verdict that fails."""
     of_verdicts = (
         caution
         for verdict in card.verdicts
@@ -405,7 +417,7 @@ def card(
     parts: Parts | None = None,
     **options: Unpack[Judging],
 ) -> JudgedCard:
-    """Print solver input for switching windows, as ``d2rpick card`` does; if a run is given, judge the windows.
+    """Print solver input for switching windows, as ``d2rpick card`` does. If a run is given, judge the windows.
 
     Parameters
     ----------
@@ -458,7 +470,7 @@ def card(
 def print_card(
     windows: Sequence[Times], run: Run | None, request: Request, cards: Cards
 ) -> JudgedCard:
-    """Print the card for windows; if there is a run, use it to judge the printed times."""
+    """Print the card for windows. If a run is given, judge the printed times with it."""
     from d2rpick.deck.printing import SOLVERS, find_solver, print_cards
 
     if run is None:
@@ -476,7 +488,7 @@ def print_card(
 
 
 def _complete_alone(request: Request, cards: Cards) -> Printing:
-    """Return the options of a card that has no history; raise ArgumentError if an option is missing."""
+    """Return the options of a card without a history; raise ArgumentError if an option is missing."""
     from d2rpick.deck.printed_card import Printing
     from d2rpick.deck.printing import DEFAULT, SOLVERS
 

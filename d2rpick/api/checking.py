@@ -1,4 +1,4 @@
-"""Check decks by the rules and, if there is a history, by judging their windows."""
+"""Check decks by the rules and, if a history is given, by judging the windows of the decks."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Findings(Answer, Checks):
 
     @property
     def passed(self) -> bool:
-        """True if all decks were checked and no finding is as severe as ``fail_on`` or more severe."""
+        """True if all decks were checked and every finding is less severe than ``fail_on``."""
         return not self.failed and all(
             finding.severity.rank > self.fail_on.rank for finding in self.findings
         )
@@ -73,7 +73,7 @@ class Findings(Answer, Checks):
 
     @property
     def windows(self) -> tuple[CheckedWindow, ...]:
-        """Windows in all decks in which parts are rigid."""
+        """Windows of all decks during which parts are rigid."""
         return tuple(window for result in self.results for window in result.windows)
 
     def to_frame(self) -> pd.DataFrame:
@@ -202,7 +202,7 @@ def find_findings(
 
 
 def check_written(deck: str, judge: HistoryJudge) -> Findings:
-    """Check a deck that d2rpick wrote, using the nearest configuration in its folder or a parent folder."""
+    """Check a deck that d2rpick wrote, with the nearest configuration in its folder or a parent folder."""
     checked = check_deck(
         deck, find_configuration(deck, Configuration(), SETTINGS), judge
     )
@@ -214,7 +214,7 @@ def check_written(deck: str, judge: HistoryJudge) -> Findings:
 def _check_each(
     deck_names: Sequence[str], rules: Configuration, judge: HistoryJudge | None
 ) -> Iterator[Checked | Unreadable]:
-    """Yield the result for each deck and each run, each once; a folder stands for its main decks."""
+    """Yield the result for each deck and each run, each only once; a folder stands for its main decks."""
     visited: set[str] = set()
     # Results are cached, because the function makes a system call for each parent folder.
     real_folder = cache(os.path.realpath)
@@ -263,7 +263,7 @@ def _list_decks(name: str) -> list[str] | DeckError:
 
 
 def _find_restarts(decks: Sequence[str]) -> dict[str, list[str]]:
-    """Return the small restart decks of each LS-DYNA deck, if they are the only other decks in its folder."""
+    """Return the small restart decks of each LS-DYNA deck, if its folder contains no other decks."""
     small = [deck for deck in decks if is_restart(deck)]
     legs: dict[str, list[str]] = {}
     for restart in small:
@@ -285,7 +285,7 @@ def _check_one(
     folder: str,
     restarts: Sequence[str],
 ) -> Checked | Unreadable:
-    """Check a deck by the nearest configuration. An error is returned, not raised, so that other decks are checked."""
+    """Check a deck by the nearest configuration. An error is returned so that the other decks are still checked."""
     source = ""
     try:
         configuration = configured(folder)

@@ -19,10 +19,10 @@ class JudgingOptions(TypedDict, total=False):
     ``after``: end of the load (default: found from the record).  ``landing``: time of the next contact after the
     flight; td is earlier by the margin (default: found from the record).  ``margin``: time kept free after the load
     and before the next contact (default: 0; before the contact it is derived if d2rpick chooses td, or with
-    ``landing``).  ``tolerance``: largest frozen-deformation error, or level error if no oscillator describes the
-    record (default: 0.2).  ``max_kinetic_share``: reject a td with a larger kinetic fraction.  ``max_residual``:
-    reject a pair with a larger residual.  ``min_quality``: lowest grade that is not reported as a problem (exit code
-    1) (default: fair; poor if only ``td`` is given).
+    ``landing``).  ``tolerance``: largest frozen-deformation error, or level error with the basis energy; no effect
+    with the basis modal (default: 0.2).  ``max_kinetic_share``: reject a td with a larger kinetic fraction.
+    ``max_residual``: reject a pair with a larger residual.  ``min_quality``: lowest grade that is not reported as a
+    problem (exit code 1) (default: fair; poor if only ``td`` is given).
     """
 
     after: float | str | None

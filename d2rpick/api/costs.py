@@ -1,4 +1,4 @@
-"""Determine which parts may be switched and what sets of parts save; fit element costs to the runs at a site."""
+"""Determine which parts may be switched and what sets of parts save, and fit element costs to the runs of a site."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ class PartTable(Paged, sets_of_parts.Parts):
         )
 
     def plot(self) -> Figure:
-        """Draw the flights, and the energies of the parts with the largest energies."""
+        """Draw the flights, and the energies of those parts that have the largest energies."""
         from d2rpick.report.figures_choice import draw_parts
 
         return draw_parts(self)
@@ -153,7 +153,7 @@ def compare_parts(
 
 
 def check_times(tr: float | None, td: float | None) -> Times | float | None:
-    """Return the window in which sets are compared, or only its end; raise ArgumentError if tr is given without td."""
+    """Return the window in which sets are compared, or its end only; raise ArgumentError for tr without td."""
     if tr is not None and td is None:
         raise ArgumentError("`tr` needs `td`, the end of the window")
     if tr is not None and td is not None and not tr < td:
@@ -175,7 +175,7 @@ class Calibration(Answer, calibration.FittedWeights):
     said = ("weights", "told", "misfit")
 
     def to_frame(self) -> pd.DataFrame:
-        """Return a row per formulation: its weight, the OpenRadioss weight, and whether the runs determine its weight.
+        """Return a row per formulation: its weight, the OpenRadioss weight, and whether the runs determine the weight.
 
         Examples
         --------
@@ -194,7 +194,7 @@ class Calibration(Answer, calibration.FittedWeights):
 
 
 def calibrate(runs: arguments.Path | Iterable[arguments.Path]) -> Calibration:
-    """Fit the cost of elements to the CPU times of the runs at a site, as ``d2rpick calibrate`` does.
+    """Fit the cost of elements to the CPU times of a site's runs, as ``d2rpick calibrate`` does.
 
     Parameters
     ----------

@@ -30,9 +30,9 @@ if TYPE_CHECKING:
 
     from d2rpick.running.sequence import Leg
 
-# Shortest allowed time from td to the next contact [s].
+# Shortest time from td to the next contact that is allowed [s].
 _SHORTEST = 2e-3
-# Assumed cost of a cycle with rigid parts, relative to a deformable cycle, if the deck does not imply it [-].
+# Assumed cost of a cycle with rigid parts relative to a deformable one, if it does not follow from the deck [-].
 _UNKNOWN = 0.5
 
 
@@ -57,7 +57,7 @@ class Drive(Paged, Driven):
 
 
 class Driving:
-    """A run that ``d2rpick drive`` starts or resumes; its times are in the unit of the deck.
+    """A run that ``d2rpick drive`` starts or resumes, with times in the unit of the deck.
 
     Raises
     ------
@@ -69,7 +69,7 @@ class Driving:
         self,
         deck: str,
         folder: Path,
-        told: Callable[[str], None],
+        report: Callable[[str], None],
         part: Sequence[str] = (),
         wait: float | None = None,
         margin: float | None = None,
@@ -78,7 +78,7 @@ class Driving:
         engine: str | None = None,
         threads: int = 1,
     ) -> None:
-        self.name, self.folder, self._told = deck, folder, told
+        self.name, self.folder, self._report = deck, folder, report
         self.commands = Commands(starter, engine, threads)
         self.deck = read_driven_deck(
             deck, parse_id_ranges("--part", part) if part else ()
@@ -149,7 +149,7 @@ class Driving:
                     journal,
                     self.limits,
                     self.looks,
-                    self._told,
+                    self._report,
                 )
             except OSError as error:
                 if error.errno not in (errno.ENOSPC, errno.EDQUOT):
@@ -159,7 +159,7 @@ class Driving:
                 ) from None
 
     def answer(self, driver: Driver, command: Sequence[str]) -> Drive:
-        """Return the result of the part of the run that has been computed."""
+        """Return the result for the part of the run that has been computed."""
         legs = driver.journal.legs
         last = legs[-1].order.number if legs else 0
         names = [str(self.solver.history(number)) for number in range(1, last + 1)]

@@ -1,4 +1,4 @@
-"""Compute the sample models: requests for the floating oscillator and the rollover box, and the answers."""
+"""Compute the sample models: define the requests for the oscillator and the rollover box, and their answers."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ TD = 0.37
 TILT = 30.0
 # Default end time of the simulation [s]; the key is True for a dropped box.
 T_END = {False: 0.42, True: 1.2}
-# A run gets a caution if its energy imbalance exceeds this fraction of its largest total energy [-].
+# A caution is issued if the energy imbalance of a run exceeds this fraction of its largest total energy [-].
 BALANCED = 0.01
 
 
@@ -136,7 +136,7 @@ class Motion:
             for name in ("stiffness", "mass", "frame_mass", "beta", "alpha")
         }
         oscillator = Request(**parameters, v0=0.0).oscillator
-        # On the command line, the oscillator is always complete, because click requires all its options.
+        # On the command line, the oscillator is always complete, because click requires all options of the oscillator.
         assert oscillator is not None
         return oscillator
 
@@ -303,7 +303,7 @@ def _check_windows(
 
 
 class Scanning:
-    """A scan over tr: the reference run, the recommendation derived from it, and the other values of tr."""
+    """A scan over tr: the reference run, the recommendation derived from this run, and the other values of tr."""
 
     def __init__(self, box: Box) -> None:
         from d2rpick.base.workers import count_cores, start_importing
@@ -326,7 +326,7 @@ class Scanning:
             self.times = times
 
     def run(self, told: Callable[[int], None]) -> Scan:
-        """Compute the runs of the scan; call ``told`` with the number of finished runs."""
+        """Compute the runs of the scan, and call ``told`` with the number of finished runs."""
         from d2rpick.models.box_run import scan
         from d2rpick.report.rollover import Scan
 
@@ -341,7 +341,7 @@ class Scanning:
 
 
 def warn_if_unbalanced(record: Record) -> tuple[Caution, ...]:
-    """Return a caution if the energy of a run is not balanced, as can happen with damping over few time steps."""
+    """Return a caution if the energy of a run is not balanced, e.g. because of damping over few time steps."""
     imbalance = float(abs(record.imbalance).max())
     if imbalance <= BALANCED:
         return ()

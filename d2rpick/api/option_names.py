@@ -36,7 +36,7 @@ _OTHERS: Final = {
 
 
 def replace_arguments(message: str) -> str:
-    """Replace the argument names in a message with the options that set them.
+    """Replace the names of arguments in a message with the options that set these arguments.
 
     Examples
     --------

@@ -230,7 +230,7 @@ class Plan(RunAnswer, planning.RunPlan):
         )
 
     def _card_of_windows(self, cards: Cards) -> JudgedCard | None:
-        """Return the card for the next run; None if no parts are named, or if the deck's bodies cannot be switched."""
+        """Return the card for the next run; None if no parts are named or the deck's bodies cannot be switched."""
         from d2rpick.choice.judged_card import complete_printing, list_switched
 
         try:
@@ -304,7 +304,7 @@ def plan_for_question(
     done: Sequence[Times],
     before: Run | None,
 ) -> Plan:
-    """Plan the rigid windows of a run, or the windows that follow the windows ``done`` in a finished run."""
+    """Plan the rigid windows of a run, or those that follow the windows ``done`` in a finished run."""
     if before is not None and not done:
         raise ArgumentError(
             "`before` compares the landings of a switched run; name its windows with `done`"
@@ -326,7 +326,7 @@ def plan_for_question(
         before=earlier,
     )
     times = [] if min_rigid is None else ["--min-rigid", repr(min_rigid)]
-    # The text has one line for each window, in the format that `check` reads from standard input.
+    # The text has one line per window, in the format that `check` reads from standard input.
     times += ["--done", "-"] if windows else []
     times += [
         text
@@ -339,7 +339,7 @@ def plan_for_question(
 def write_planned_deck(
     plan: Plan, card: JudgedCard, folder: str, *, overwrite: bool
 ) -> tuple[list[str], Findings]:
-    """Write a copy of the plan's deck with the plan's card, and check the copy against the history.
+    """Write a copy of the plan's deck with the plan's card, and check the copy by means of the history.
 
     Returns the names of the files, the main one first, and the findings in it.
     """

@@ -39,7 +39,7 @@ READING: Final = ("input_format", "time", "energy", "part", "flying", "channel")
 _READING_FOR_CARDS: Final = tuple(name for name in READING if name != "part")
 OSCILLATOR: Final = ("stiffness", "mass", "frame_mass", "beta", "alpha", "v0")
 _MODEL: Final = (*OSCILLATOR, "no_verify")
-# Options for choosing a pair; subsets of them apply to sets of parts, to many runs, and to judging cards.
+# Options for choosing a pair, parts of which also apply to sets of parts, to many runs, and to judging cards.
 _USES: Final = list_uses()
 CHOOSING: Final = (*_USES, *_MODEL)
 CHOOSING_FOR_SETS: Final = (
@@ -53,8 +53,8 @@ ADVANCED: Final = (
 )
 JUDGING: Final = (*_READING_FOR_CARDS, *CHOOSING_FOR_CARDS)
 _NOT_TYPED: Final = ("history", "given", "run_folder", "deck_in_folder")
-# Placeholder for weights that do not come from a file.
-# A command line with this placeholder is refused, because it does not contain the weights.
+# Placeholder for weights that were not read from a file.
+# A command line with this placeholder is refused, because the placeholder does not contain the weights.
 _IN_MEMORY: Final = "<weights in memory>"
 
 
@@ -106,7 +106,7 @@ class ReadingOptions:
     )  # fmt: skip
 
 
-# Objects of this class never change, but it is not frozen, like the other tables of options.
+# Objects of this class never change, but the class is not frozen, like the other tables of options.
 # A frozen class of options would increase the start-up time of each command by 2 %.
 @dataclass(eq=False, repr=False, kw_only=True)
 class Request(ChoiceOptions, ReadingOptions):
@@ -130,7 +130,7 @@ class Request(ChoiceOptions, ReadingOptions):
         "Velocity of the frame at time 0. Nothing else moves at time 0.", TIME, "vz0"
     )
     no_verify: bool = make_option(
-        "Judge by the energy level alone, without an oscillator.",
+        "Judge by the energy level alone, without a vibration model.",
         *("flag",), default=False, instead_of=("stiffness", "fit_window"),
     )  # fmt: skip
     run_folder: str | None = None  # Folder of the run with the files in `history`.
@@ -139,7 +139,7 @@ class Request(ChoiceOptions, ReadingOptions):
     given: Collection[str] | None = None
 
     def __post_init__(self) -> None:
-        """Refuse contradictory options."""
+        """Refuse options that contradict each other."""
         if self.no_deck and self.deck:
             raise ArgumentError("`deck` and `no_deck` exclude each other")
         if self.folder is None:
@@ -164,7 +164,7 @@ class Request(ChoiceOptions, ReadingOptions):
 
     @property
     def folder(self) -> str | None:
-        """Folder of the run, which should contain its main deck; None if a deck is named or excluded."""
+        """Folder of the run, which should contain its main deck; None if the user names or excludes a deck."""
         import os
 
         if self.deck is not None or self.no_deck:
@@ -173,7 +173,7 @@ class Request(ChoiceOptions, ReadingOptions):
         return self.run_folder or (name if os.path.isdir(name) else None)  # noqa: PTH112  Path.is_dir fails on some names
 
     def check_deck(self) -> None:
-        """Refuse options that need a deck if no deck is given."""
+        """Refuse options that need a deck if none is given."""
         if self.step_ratio is not None and self.cost_share is None and not self.deck:
             raise ArgumentError(
                 "`step_ratio` needs `cost_share` or `deck` too: the CPU time depends on both"
@@ -250,7 +250,7 @@ class Request(ChoiceOptions, ReadingOptions):
         )
 
     def asking(self, names: Collection[str] | None = None) -> tuple[str, ...]:
-        """Return the given options, or only those in ``names``, as typed after a td on the command line."""
+        """Return the given options, or only those in ``names``, as they are typed after a td on the command line."""
         chosen = list(self._given())
         if names is not None:
             chosen = [name for name in chosen if name in names]

@@ -14,11 +14,11 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from d2rpick.api.arguments import Parts, Time
-    from d2rpick.running.events import Event
+    from d2rpick.report.follow import Event
 
 
 class FirstRun(NamedTuple):
-    """Result of `first`: the names of the ``files``, the main deck first, and ``notes`` on what is unknown.
+    """Result of `first`: the names of the ``files`` with the main deck first, and ``notes`` on what is unknown.
 
     ``wait`` is the force-free time that counts as flight [time of the deck], ``reason`` its origin.
     """
@@ -136,10 +136,13 @@ def follow(
     Examples
     --------
     >>> import d2rpick as d2
-    >>> [one.event for one in d2.follow("sample_data/rolloverT01.gz", parts="box", lasting=0)][:2]
+    >>> [event.event for event in d2.follow("sample_data/rolloverT01.gz", parts="box", lasting=0)][:2]
     ['begun', 'load']
     """
-    from d2rpick.running import watch  # Imported here to keep start-up fast.
+    from d2rpick.report.follow import (
+        describe_news,
+    )  # Imported here to keep start-up fast.
+    from d2rpick.running import watch
 
     selection = Selection(parts=arguments.list_part_names("parts", parts))
     inventory = None
@@ -150,6 +153,6 @@ def follow(
         inventory = read_inventory(main)
     time = TimeArguments.of_deck(main).check_time("wait", wait)
     seconds = arguments.check_optional_number("lasting", lasting)
-    return watch.follow(
-        [arguments.check_path("run", run)], selection, time, inventory, lasting=seconds
-    )
+    names = [arguments.check_path("run", run)]
+    reads = watch.follow(names, selection, time, inventory, lasting=seconds)
+    return describe_news(reads, names, selection.parts)

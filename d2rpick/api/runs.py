@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Run:
-    """One run: its opened files, and the columns that the user assigned in a table; it is immutable.
+    """One run: its opened files, and the table columns that the user assigned to quantities; it is immutable.
 
     A run can be pickled: a copy, also in another process, contains the same bytes, or opens the same big files again.
     Two runs are equal if the same bytes were read under the same names, in the same way.
@@ -94,7 +94,7 @@ class Run:
         return self.files.notes
 
     def overview(self, deck: arguments.Deck | None = None) -> Overview:
-        """Return what ``d2rpick info`` shows: format, states, sampling, channels, parts, flights, health.
+        """Return what ``d2rpick info`` shows: format, states, sampling, channels, parts, flights and health.
 
         The main ``deck`` of the run tells gravity, supports and imposed motion.  Default: the only main deck in the
         folder that was read; False for none.
@@ -108,7 +108,7 @@ class Run:
 
     @property
     def _deck_in_folder(self) -> str | None:
-        """The main deck in the folder that was read, if it contains only one; otherwise None."""
+        """The main deck in the folder that was read; None unless there is exactly one."""
         if self.folder is None:
             return None
         from d2rpick.deck import find_decks_of_run
@@ -117,7 +117,7 @@ class Run:
         return decks[0] if len(decks) == 1 else None
 
     def to_frame(self, parts: Parts | None = None) -> pd.DataFrame:
-        """Return energies over time as a table, at full precision.
+        """Return energies over time as a table at full precision.
 
         Parameters
         ----------
@@ -408,7 +408,7 @@ def make_selection(
 def extract_columns(
     run: histories.OpenedRun, selection: Selection
 ) -> tuple[dict[str, Samples], tuple[str, ...]]:
-    """Return the selected columns of a run, all quantities that are known at the same times, and notes on them.
+    """Return the selected columns of a run, all quantities known at the same times, and notes on them.
 
     ``time`` and ``internal_energy``, with several parts ``part_<id>`` for each, ``not_chosen_part_<id>`` for each part
     that flies with them, then quantities of the whole model and the momentum that shows the flight, each of shape (n,).
@@ -450,7 +450,7 @@ def extract_columns(
 
 
 def _list_model_columns(history: History) -> dict[str, Samples]:
-    """Return the energy terms of the whole model, keyed by name; empty unless they have the same times as the energy.
+    """Return the energy terms of the whole model by name; empty if their times differ from those of the energy.
 
     The kinetic energy includes rotation.  The internal energy is included if the selected energy is that of some parts.
     """

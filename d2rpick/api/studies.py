@@ -1,4 +1,4 @@
-"""Ask the same question about many runs. A file with a line for each judged run makes it possible to resume a study."""
+"""Ask the same question about many runs. A file with a line per judged run makes it possible to resume a study."""
 
 from __future__ import annotations
 
@@ -158,7 +158,7 @@ def find_runs(names: Iterable[str]) -> tuple[str, ...]:
 
 
 def _remove_repeated(names: Iterable[str]) -> list[str]:
-    """Return each file or folder once, by its shortest name, because circular links give it many names."""
+    """Return each file or folder only once, by its shortest name, because circular links give it many names."""
     shortest_first = sorted(names, key=lambda name: (len(name), name), reverse=True)
     return sorted({os.path.realpath(name): name for name in shortest_first}.values())
 
@@ -180,7 +180,7 @@ def answer_study(
     times: tuple[str, ...] = () if td is None else ("--td", repr(td))
     if isinstance(td, tuple):
         times = ("--td-window", *map(repr, td))
-    # A study reports no CPU time, so these options are omitted from its command.
+    # A study reports no CPU time, so these options are omitted from its command line.
     options = replace(request, cost_share=None, step_ratio=None).asking()
     return Study.of(
         core.compare_rows(td, rows),
@@ -197,7 +197,7 @@ def compute_rows(
     absolute: bool = False,
     told: Callable[[int], None] | None = None,
 ) -> Iterator[StudyRow]:
-    """Yield the rows in the order of the runs, each as soon as it and all rows before it are computed.
+    """Yield the rows in the order of the runs, each as soon as this row and all rows before it are computed.
 
     Parameters
     ----------
@@ -241,13 +241,13 @@ def compute_rows(
 
 
 def compute_fingerprint(question: Question) -> str:
-    """Return a digest of the options and the version, which affect a row in addition to the files of its run."""
+    """Return a digest of the version and the options, which affect a row in addition to the files of its run."""
     values = {**asdict(question), "curve": None}
     return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()[:16]
 
 
 def write_row(row: StudyRow, question_digest: str) -> str:
-    """Return a row as one line that contains its values and the data needed to restore it.
+    """Return a row as one line with its values and the data that are needed to restore it.
 
     ``asked`` is the ``fingerprint`` of the question.
     """
@@ -289,7 +289,7 @@ class Ledger:
                 f"{name}: cannot be written (not a regular file); give another file"
             )
         try:
-            # The file is opened before the work begins, so that an unwritable file is reported at once.
+            # The file is opened before the work begins, so that a file that cannot be written is reported at once.
             with Path(name).open("a+b") as file:
                 file.seek(0)
                 content = file.read()

@@ -312,7 +312,7 @@ def verify(
 
 
 def check_pair(tr: float | None, td: float | None, switched: object) -> None:
-    """Refuse an incomplete pair; both times are needed unless a switched run defines them."""
+    """Refuse an incomplete pair. Both times are needed unless a switched run defines them."""
     if not switched and (tr is None or td is None):
         raise ArgumentError(
             f"give `{'tr' if tr is None else 'td'}` too, or a finished switched run"
@@ -326,7 +326,7 @@ def judge_pair(
     switched: Run | None = None,
     min_mean_energy: float = MIN_MEAN_ENERGY,
 ) -> Verdict:
-    """Judge a pair; a finished switched run, if given, is compared too and provides the times that are not given."""
+    """Judge a pair. A finished switched run, if given, is compared as well, and defines times that are not given."""
     check_pair(tr, td, switched)
     switched_reference = switched and question.reference.like(
         switched.files, question.selection

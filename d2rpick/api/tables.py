@@ -1,4 +1,4 @@
-"""Convert tables of other libraries to pandas frames without importing these libraries."""
+"""Convert the tables of other libraries to pandas frames without importing these libraries."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _METHODS_OF_TABLES: Final = (
 
 
 def is_table(value: Any) -> bool:
-    """Return True if a value is a table of some library or an array of numbers, and False for the name of a file.
+    """Return True if a value is a table of a library or an array of numbers, and False if it is the name of a file.
 
     Examples
     --------
@@ -69,7 +69,7 @@ def convert_to_frame(table: Any) -> pd.DataFrame:
         return pd.DataFrame(frame)
     if hasattr(table, "collect"):  # The table is a lazy polars frame.
         table = table.collect()
-    # The table is a polars frame; its own conversion to pandas needs pyarrow.
+    # The table is a polars frame, whose own conversion to pandas needs pyarrow.
     if hasattr(table, "columns") and hasattr(table, "get_column"):
         return pd.DataFrame(
             {str(name): table.get_column(name).to_numpy() for name in table.columns}

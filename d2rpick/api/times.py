@@ -1,4 +1,4 @@
-"""Convert times with a unit, such as 64ms, to numbers in the unit of a run; check arguments that are times."""
+"""Convert times with a unit, e.g. 64ms, to numbers in the unit of a run, and check arguments that are times."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class TimeUnit(NamedTuple):
-    """Time unit of a run, empty if it is unknown, and the source that should name the unit."""
+    """Time unit of a run, empty if it is unknown, and the source that should give the unit."""
 
     name: str
     source: str
@@ -31,7 +31,7 @@ _WITHOUT_RUN: Final = TimeUnit("", "the arguments, which contain no run")
 
 
 class TimeArguments:
-    """Check arguments that are times: numbers in the unit of a run, or strings with a unit, such as "64ms".
+    """Check arguments that are times: numbers in the unit of a run, or strings with a unit, e.g. "64ms".
 
     ``find_unit`` returns the unit to which strings are converted.  It is called only if there is a string, since it
     may have to open a run.
@@ -48,7 +48,7 @@ class TimeArguments:
 
     @classmethod
     def of_deck(cls, deck: str | None) -> TimeArguments:
-        """Return a converter of times to the unit of a deck; only Radioss decks name a unit."""
+        """Return a converter of times to the unit of a deck; only Radioss decks give a unit."""
         return cls(lambda: find_unit_of_deck(deck))
 
     @classmethod
@@ -75,7 +75,7 @@ class TimeArguments:
     def convert_options(
         self, values: Mapping[str, Any], options: Mapping[str, Option]
     ) -> dict[str, Any]:
-        """Return the values of options, keyed by name, after converting the times among them."""
+        """Return the values of options, keyed by name, with the times among them converted."""
         return {
             name: self.convert(name, value)
             if name in options and options[name].is_time
@@ -114,7 +114,7 @@ def is_time_with_unit(text: str) -> bool:
 
 
 def find_unit_of_deck(deck: str | None) -> TimeUnit:
-    """Return the time unit that a deck names; empty if it names none, as in LS-DYNA.
+    """Return the time unit given in a deck; empty if the deck gives none, as in LS-DYNA.
 
     Raises
     ------
@@ -129,7 +129,7 @@ def find_unit_of_deck(deck: str | None) -> TimeUnit:
 
 
 def find_unit_of_run(run: Run | None) -> TimeUnit:
-    """Return the time unit that the files of an opened run name; empty if they name none, or different units."""
+    """Return the time unit that the files of an opened run give; empty if they give none or different units."""
     if run is None:
         return _WITHOUT_RUN
     arguments.check_run("run", run)
@@ -140,7 +140,7 @@ def find_unit_of_run(run: Run | None) -> TimeUnit:
 def find_common_unit(
     runs: Sequence[Sequence[str]], selection: Selection, input_format: str
 ) -> TimeUnit:
-    """Return the time unit that the files of all runs name; empty if they name none, or different units.
+    """Return the time unit that the files of all runs give; empty if they give none or different units.
 
     Raises
     ------
@@ -158,7 +158,7 @@ def find_common_unit(
 
 
 def _choose_only_unit(units: set[str]) -> str:
-    """Return the unit if there is only one; empty if there are none or several."""
+    """Return the unit if there is exactly one; otherwise empty."""
     return next(iter(units)) if len(units) == 1 else ""
 
 

@@ -1,4 +1,4 @@
-"""Provide the ``cached_property`` of Python 3.12 for Python 3.11, whose own version acquires a lock at each access."""
+"""Provide the ``cached_property`` of Python 3.12 for Python 3.11, whose own version locks at each access."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Define one-line errors and warnings; each names the place, the value found, the value expected, and the remedy."""
+"""Define one-line errors and warnings; each gives the place, the value found, the expected value, and the remedy."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ if TYPE_CHECKING:
 # Unicode categories of the characters that are escaped: control and format characters, and line separators.
 UNSEEN: Final = frozenset({"Cc", "Cf", "Zl", "Zp"})
 _Read = TypeVar("_Read")
-_MOST_NAMED: Final = 20  # Largest number of names listed in one message.
+_MOST_NAMED: Final = 20  # Largest number of names that one message lists.
 
-# Code of the warning that an input was skipped because of a bug in the program.
+# Code of the warning that a bug in the program caused an input to be skipped.
 INTERNAL_ERROR: Final = "internal-error"
 
 
@@ -37,7 +37,7 @@ class HistoryError(D2RPickError):
 
 
 class RangeError(D2RPickError):
-    """A time or a parameter is outside the range that the history or the mechanics allow."""
+    """A time or a parameter lies outside the range that the history or the mechanics allow."""
 
 
 class DeckError(D2RPickError):
@@ -59,12 +59,12 @@ class Caution(NamedTuple):
     message: str
 
 
-# Errors with a cause outside the program, such as invalid input, a full disk or too little memory.
+# Errors with a cause outside the program, e.g. invalid input, a full disk or too little memory.
 FORESEEN: Final = (D2RPickError, OSError, MemoryError)
 
 
 def give_if_written(read: Callable[[], _Read]) -> _Read | None:
-    """Return the result of ``read``, or None if the files lack the data at any state."""
+    """Return the result of ``read``; None if the files lack the data for any state."""
     try:
         return read()
     except FormatError:
@@ -72,7 +72,7 @@ def give_if_written(read: Callable[[], _Read]) -> _Read | None:
 
 
 def format_in_one_line(error: BaseException) -> str:
-    """Return any error as a one-line message; for an unforeseen error, the message asks the user to report it.
+    """Return any error as a one-line message; for an unforeseen error, ask the user to report it.
 
     Examples
     --------
@@ -93,7 +93,7 @@ def format_in_one_line(error: BaseException) -> str:
 
 
 def make_printable(text: str) -> str:
-    r"""Escape the characters of a name that would break a line or control a terminal.
+    r"""Escape those characters of a name that would break a line or control a terminal.
 
     Letters of any language and blanks stay, as do the lone surrogates that stand for bytes of a file name.
 
@@ -159,7 +159,7 @@ def name_units(ids: Iterable[int], kind: str = "part") -> str:
 
 
 def choose_verb(things: Collection[object]) -> str:
-    """Return "is" for one thing and "are" for several."""
+    """Return "is" for one thing and "are" for several things."""
     return "is" if len(things) == 1 else "are"
 
 

@@ -26,30 +26,30 @@ _BOUNDS: Final = {
     "RATIO": (
         100.0,
         "times as many bytes",
-    ),  # Largest ratio of unpacked to packed size; real files: 3 to 30
-    # Largest unpacked size [bytes]; it is limited because unpacked data are kept in memory.
+    ),  # Largest ratio of unpacked to packed size; real files have a ratio of 3 to 30.
+    # Largest unpacked size [bytes], which is limited because unpacked data are kept in memory.
     "UNPACKED": (4e9, "bytes"),
     "LINE": (
         1e6,
         "bytes",
-    ),  # Largest length of a line [bytes]; it is enough for about 50,000 columns.
+    ),  # Largest length of a line [bytes], which is enough for about 50,000 columns.
     "DEPTH": (100.0, "groups"),
 }
 # The ratio of unpacked to packed size is checked above this unpacked size [bytes]; constant columns reach 1000.
 _ALLOWED: Final = 1 << 24
 _TRIES: Final = 5  # Number of attempts to read a file that keeps changing.
 _TICK: Final = 50_000_000  # Resolution of the file times on most file systems [ns].
-# Resolution of file times on file systems that store seconds without fractions [ns].
+# Resolution of file times on file systems that store whole seconds [ns].
 _COARSE: Final = 2_000_000_000
-# Longest time needed to write a byte [ns]. A system may set the file time when the last write begins.
+# Longest time that is needed to write a byte [ns]; a system may set the file time when the last write begins.
 _SLOWEST: Final = 5
-# Pause before a file that may still be being written is read again [s].
+# Pause before a file is read again that may still be being written [s].
 _PAUSE: Final = 0.05
 _CHECKSUM: Final = ', "checksum": "'
 
 
 class Searched(Protocol):
-    """A bytes-like object that can be searched backwards for a marker."""
+    """An object of bytes that can be searched backwards for a marker."""
 
     def __len__(self) -> int: ...
 
@@ -73,7 +73,7 @@ def bound(name: str) -> float:
 
 
 def describe_excess(name: str, value: float = float("inf")) -> str:
-    """Return a message with the remedy if a value exceeds its limit, otherwise an empty string.
+    """Return a message with the remedy if a value exceeds its limit; otherwise return an empty string.
 
     Examples
     --------
@@ -88,13 +88,13 @@ def describe_excess(name: str, value: float = float("inf")) -> str:
 
 
 def describe_unpacked_excess(packed: int, unpacked: int) -> str:
-    """Return a message if ``packed`` bytes unpack to more bytes than the limits allow, otherwise an empty string."""
+    """Return a message if ``packed`` bytes unpack to more bytes than the limits allow; otherwise return ""."""
     ratio = unpacked / max(packed, 1) if unpacked > _ALLOWED else 0.0
     return describe_excess("UNPACKED", unpacked) or describe_excess("RATIO", ratio)
 
 
 def find_long_line(data: bytes | Searched, most: float | None = None) -> int:
-    r"""Return the offset of a line that exceeds the length limit, or -1; only part of the data is examined.
+    r"""Return the offset of a line that exceeds the length limit, or -1; only a part of the data is examined.
 
     ``most`` is the bound, if it is known already.
 
@@ -114,7 +114,10 @@ def find_long_line(data: bytes | Searched, most: float | None = None) -> int:
 
 
 class FileState(NamedTuple):
-    """Identity, size and times of a file; ``settled``: no write is pending, and any later write would change them."""
+    """Identity, size and times of a file.
+
+    If ``settled``, no write is pending, and any later write would change them.
+    """
 
     device: int
     inode: int
@@ -130,7 +133,7 @@ class FileState(NamedTuple):
 
     @classmethod
     def of_stat(cls, status: os.stat_result, *, may_grow: bool = False) -> FileState:
-        """Return the current state of a file from the status reported by the operating system.
+        """Return the current state of a file from the status that the operating system reports.
 
         A write in progress to a file that ``may_grow`` appends to it, so that its size does not matter.
         """
@@ -152,18 +155,18 @@ class FileState(NamedTuple):
         )
 
     def is_as(self, earlier: FileState) -> bool:
-        """Return True if this is the same file and shows no change."""
+        """Return True if this is the same file without any change."""
         return self[:-1] == earlier[:-1]
 
     def continues(self, earlier: FileState) -> bool:
-        """Return True if this is the same file, possibly grown. A new file can reuse the inode number of an old one."""
+        """Return True if this is the same file, which may have grown. A new file can reuse an old inode number."""
         return self.is_as(earlier) or (
             self[:2] == earlier[:2] and self.size > earlier.size
         )
 
 
 def compute_slowness(changed: int, size: int) -> int:
-    """Return the extra time before a state counts as settled [ns]; large files and coarse file times need more."""
+    """Return the extra time before a state is treated as settled [ns]; large files and coarse file times need more."""
     return _SLOWEST * size + (0 if changed % 1_000_000_000 else _COARSE)
 
 
@@ -210,7 +213,7 @@ def wait_for_settled_states(
 
 
 def _settle(name: str, state: FileState) -> FileState:
-    """Return the state of a file; the state counts as settled if the file has only grown since ``state`` was read."""
+    """Return the state of a file, which is settled if the file has only grown since ``state`` was read."""
     now = state if state.settled else _state_of(name)
     return state._replace(settled=True) if now.continues(state) else now
 
@@ -233,7 +236,7 @@ def read_into(file: FileIO, room: memoryview, begin: int) -> int:
 
 
 def _read_once(file: FileIO, room: memoryview, begin: int) -> int:
-    """Read bytes from an offset into ``room``, and return their number; use a single system call if possible."""
+    """Read bytes from an offset into ``room``, if possible in a single system call, and return their number."""
     if hasattr(os, "preadv"):
         return os.preadv(file.fileno(), [room], begin)
     file.seek(begin)
@@ -263,7 +266,7 @@ def read_at_rest(
 
 
 def write_as_a_whole(path: Path, content: bytes) -> None:
-    """Write a file completely or not at all: the data go to a temporary file, which replaces the old file at the end.
+    """Write a file completely or not at all: write the data to a temporary file, which then replaces the old file.
 
     A replaced file keeps its mode, and its owner and group as far as the user may set them. A link stays, and the
     file to which it points is replaced; a device or a named pipe is written to.
@@ -277,7 +280,7 @@ def write_as_a_whole(path: Path, content: bytes) -> None:
         path = path.resolve()
     except RuntimeError:  # Python before 3.13, for links that form a loop
         path = path.absolute()
-    # If resolve() still returns a link, the link is part of a loop.
+    # If resolve() still returns a link, this link is part of a loop.
     if path.is_symlink():
         raise OSError(ELOOP, os.strerror(ELOOP), str(path))
     # The temporary name is not derived from the file name, which may already have the maximum length.
@@ -294,7 +297,7 @@ def write_as_a_whole(path: Path, content: bytes) -> None:
 
 
 def _copy_access(replaced: Path, scratch: Path) -> None:
-    """Copy owner, group and mode of the file that will be replaced; without such a file, use the default mode."""
+    """Copy owner, group and mode of the file that will be replaced; if there is none, use the default mode."""
     try:
         status = replaced.stat()
     except FileNotFoundError:

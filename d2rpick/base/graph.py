@@ -16,7 +16,7 @@ def find_reachable(
     *,
     wide: bool = False,
 ) -> list[Node]:
-    """Return the starts and all nodes reachable from them by repeated calls of ``further``, without duplicates.
+    """Return the starts and all nodes that repeated calls of ``further`` reach from them, without duplicates.
 
     The search is depth first; if ``wide`` it is breadth first, so that the nearest nodes come first.
 

@@ -1,4 +1,4 @@
-"""Cache results computed from a record so that every td reuses them."""
+"""Cache results that are computed from a record, so that every td reuses them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Describe each option in one place: its help text, the type of its value, and the limits of its value.
+"""Describe each option in one place: its help text, and the type and limits of its value.
 
 The command line, the arguments of Python and the settings of a choice are made from tables of such options: dataclasses
 whose fields are made by `make_option`.
@@ -15,7 +15,7 @@ from d2rpick.base.tuples import NamedTuple
 
 # Upper limit of an integer range that has no upper limit of its own.
 UNLIMITED: Final = 2**63
-# Ranges of numbers; each name says which numbers the range contains.
+# Ranges of numbers, with names that describe the numbers in the range.
 TIME: Final = Number()
 POSITIVE: Final = Number(0.0, above=True)
 NOT_NEGATIVE: Final = Number(0.0)

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 _OWN, _SHARED = "d2rpick.toml", "pyproject.toml"
 _OF_REPOSITORIES: Final = (".git", ".hg")  # Folders that mark the root of a repository.
-# Name of the settings file of the deck check; the folder of each deck and the folders above it are searched.
+# Name of the settings file of the deck check, which is sought in the folder of each deck and the folders above.
 RULE_KEYS: Final = ("select", "ignore", "severity")
 # Quotes and spaces that may surround the parts of a dotted key.
 _UNIMPORTANT: Final = dict.fromkeys(map(ord, " \t\"'"))
@@ -92,7 +92,7 @@ def _list_searched_folders(folder: str) -> Iterator[str]:
 
 
 def _is_owned_by_user(path: str) -> bool:
-    """Return True if the user owns a file or folder and any link to it; always True on Windows."""
+    """Return True if the user owns a file or folder and any link to it; on Windows, always return True."""
     if not hasattr(os, "geteuid"):
         return True
     user = os.geteuid()
@@ -174,7 +174,7 @@ def _has_settings(path: str) -> bool:
 
 
 def _may_have_settings(text: str) -> bool:
-    """Return False if a pyproject.toml cannot define ``tool.d2rpick``; this test avoids importing a parser."""
+    """Return False if a pyproject.toml cannot define ``tool.d2rpick``; this test avoids the import of a parser."""
     solid = text.translate(_UNIMPORTANT)
     return any(start in solid for start in ("tool.d2rpick", "[tool]", "tool={"))
 
@@ -196,7 +196,7 @@ def _explain_toml_error(path: str, error: Exception) -> str:
 
 
 def _read_table(path: str, *, shared: bool) -> object:
-    """Return the settings in a TOML file, or None if a file ``shared`` with other tools contains no settings."""
+    """Return the settings in a TOML file; None if a file ``shared`` with other tools contains no settings."""
     try:
         # The encoding is utf-8-sig, because editors on Windows may begin a text with a byte order mark.
         with open(path, encoding="utf-8-sig") as file:

@@ -30,14 +30,14 @@ Result = TypeVar("Result")
 
 # A fork copies the locks of all threads. Forking from a clean process avoids this and is nearly as fast.
 _METHOD = "forkserver" if "forkserver" in get_all_start_methods() else "spawn"
-# Number of calls queued per process; it is large enough to keep the processes busy and small enough to save memory.
+# Number of calls queued per process, which keeps the processes busy and the memory small.
 _WAITING = 2
 # Smallest number of calls sent to a cluster at a time, because its number of workers may change.
 _LEAST_ON_CLUSTER = 64
 # Largest number of attempts to start a pool; the fork server is restarted after the first attempt.
 _STARTS = 3
-_DYING = 0.1  # Pause between attempts to start a pool [s]; it lets the system finish ending a killed process.
-# Errors raised when a process is started after the fork server was killed.
+_DYING = 0.1  # Pause between attempts to start a pool [s], in which the system finishes ending a killed process.
+# Errors that are raised if a process is started after the fork server was killed.
 _NOT_STARTED = (BrokenProcessPool, EOFError, OSError)
 # Longest wait for a reply from the scheduler [s].
 _PATIENCE = 10
@@ -60,7 +60,7 @@ class Finished(NamedTuple):
 
 
 class _Call(NamedTuple):
-    """A call for one item; ``is_suspect`` is True if the pool that computed the call broke."""
+    """A call for one item; ``is_suspect`` is True if the pool that computed it broke."""
 
     number: int
     item: Any
@@ -108,18 +108,17 @@ class Cores(Farm):
         self._pool = self._new(processes)
         self._is_closed = False
 
-    def __exit__(self, error_type: type[BaseException] | None, *_: object) -> None:
+    def __exit__(self, *exception: object) -> None:
         """End all processes.
 
         The thread of the pool is awaited: until Python 3.12, the pool's own handler at exit may use a pipe that this
-        thread is just closing, and prints a traceback.  After an interrupt nothing is awaited, to be sure to end.
+        thread is just closing, and prints a traceback.
         """
         self._is_closed = True
         self._leash.close()
-        is_interrupted = error_type is not None and issubclass(
-            error_type, KeyboardInterrupt
-        )
-        self._pool.shutdown(wait=not is_interrupted, cancel_futures=True)
+        # After an interrupt, the thread that uses the pool may hold its lock for ever: it waits for a dead process.
+        if KeyboardInterrupt not in exception:
+            self._pool.shutdown(wait=True, cancel_futures=True)
 
     def answers(
         self, function: Callable[[Item], Result], items: Iterable[Item]
@@ -180,7 +179,7 @@ class Cores(Farm):
             finished.put(error)
 
     def _submit(self, function: Callable[[Item], Result], item: Item) -> Future[Result]:
-        """Submit a call to the pool; if the pool is broken, start a new pool."""
+        """Submit a call to the pool; if the pool is broken, start a new one."""
         try:
             return self._pool.submit(function, item)
         except _NOT_STARTED:
@@ -245,19 +244,19 @@ def _begin_work(held: Connection) -> None:
 
 
 def start_importing(processes: int, module: str) -> None:
-    """Import ``module`` in one background process, from which the workers are later forked.
+    """Import ``module`` in one background process, from which the workers are forked later.
 
     Call this as early as it is known that several processes will be needed; for a single one it does nothing.
     """
     if processes > 1:
-        # numpy reads this variable when it is imported; numpy threads would compete with the processes for the cores.
+        # numpy reads this variable when it is imported; its threads would compete with the processes for the cores.
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
         if _METHOD == "forkserver":
             _start_server(module)
 
 
 def _start_server(module: str) -> None:
-    """Start the process from which others are forked; an interrupt ends it silently even during its imports."""
+    """Start the process from which others are forked; an interrupt ends it silently, even during its imports."""
     # Windows has no fork server.
     from multiprocessing import forkserver, resource_tracker
 
@@ -276,7 +275,7 @@ def choose_farm(processes: int, module: str) -> Farm:
 
 
 class Cluster(Farm):
-    """A running Dask cluster, given by the address of its scheduler, which must answer within ``patience`` [s].
+    """A running Dask cluster, given the address of its scheduler, which must answer within ``patience`` [s].
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Choose tr and td: from a history to a recommendation, a verdict, a plan, or a joint answer for many runs.
+"""Choose tr and td: turn a history into a recommendation, a verdict, a plan, or one answer for many runs.
 
 A question (`question`) consists of a reference run, the energy selected from it, and the settings.  It is answered
 in these steps:

@@ -62,7 +62,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History
     from d2rpick.histories.run import OpenedRun
 
-# The search for a better pair ends after this many pairs at other energy peaks have been found inadmissible.
+# The search for a better pair stops once this many pairs at other energy peaks turn out to be inadmissible.
 _MOST_REFUSED = 3
 
 
@@ -126,7 +126,7 @@ class PairVerdict(AnswerAtTd):
 
     @cached_property
     def _best_residual(self) -> float | None:
-        """The residual of the best tr at this td [-], if that of the pair is poor; None if it is unknown."""
+        """The residual of the best tr at this td [-] if the residual of the pair is poor; None if it is unknown."""
         residual = self.candidate.residual
         if residual is None or residual <= POOR_RESIDUAL:
             return None
@@ -135,12 +135,12 @@ class PairVerdict(AnswerAtTd):
 
     @cached_property
     def better(self) -> Pair | None:
-        """A better pair with a grade other than "poor", at this td or the nearest suitable peak; None without one."""
+        """A better pair with a grade other than "poor", at this td or at the nearest suitable peak; otherwise None."""
         return None if self._is_refuted else self._good_pair
 
     @cached_property
     def _good_pair(self) -> Pair | None:
-        """The pair recommended from the reference run alone, without regard to a finished switched run."""
+        """The pair recommended from the reference run alone, even if a finished switched run is known."""
         return find_good_pair(self.situation)
 
     @property
@@ -227,7 +227,7 @@ def verify_at(situation: Situation, tr: float) -> PairVerdict:
 
 
 def _list_remarks(judged: Candidates, candidate: Candidate) -> tuple[str, ...]:
-    """Return the notes on a candidate that are no reason against it, or that say again how large its error is."""
+    """Return the notes on a candidate that are not objections, or that repeat how large its error is."""
     objections = list_separate_objections(judged, candidate)
     return tuple(note for note in candidate.notes if note not in objections)
 
@@ -235,7 +235,7 @@ def _list_remarks(judged: Candidates, candidate: Candidate) -> tuple[str, ...]:
 def list_separate_objections(
     judged: Candidates, candidate: Candidate
 ) -> tuple[str, ...]:
-    """Return the objections to a candidate; those to the size of its error only if its residual does not show it."""
+    """Return the objections to a candidate, but those to a large error only if the residual does not show the error."""
     is_shown = candidate.residual is not None and candidate.residual > POOR_RESIDUAL
     return judged.list_objections(max(candidate.rank - 1, 0), of_error=not is_shown)
 
@@ -249,7 +249,7 @@ def _check_order(tr: float, td: float) -> None:
 
 
 class AcceptableWindow(NamedTuple):
-    """Window of acceptable tr from ``start`` to ``end`` [time]; ``share`` relates its length to the flight up to td."""
+    """Window of acceptable tr from ``start`` to ``end`` [time]; ``share`` is its fraction of the flight up to td."""
 
     start: float
     end: float
@@ -319,7 +319,7 @@ class PairSuggestion(AnswerAtTd):
 
     @cached_property
     def windows(self) -> tuple[AcceptableWindow, ...] | None:
-        """Windows of acceptable, equally good tr if the basis is "energy"; otherwise None."""
+        """Windows of acceptable and equally good tr if the basis is "energy"; otherwise None."""
         if self.situation.basis != "energy":
             return None
         flown = self.situation.td - (self.situation.earliest_tr or 0.0)
@@ -343,7 +343,7 @@ class PairSuggestion(AnswerAtTd):
 
     @property
     def _good_pair(self) -> Pair | None:
-        """Another pair, clearly better than the recommended one and not poor; otherwise None.
+        """Another pair, clearly better than the recommended one and not poor; None if there is no such pair.
 
         A residual above 0.5 is poor unless the next contact makes it negligible.
         """
@@ -424,7 +424,7 @@ def _has_smaller_residual(pair: Pair, candidate: Candidate) -> bool:
 
 
 def decide_with_better_pair(answer: PairSuggestion) -> Decision | None:
-    """Return the verdict on the recommended pair; if that pair is not good, search for a better pair first."""
+    """Return the verdict on the recommended pair, after a search for a better pair if its grade is not "good"."""
     decision = answer.decision
     best = answer.chosen
     if best is None or decision is None or decision.reaches(GOOD):
@@ -437,7 +437,7 @@ def decide_with_better_pair(answer: PairSuggestion) -> Decision | None:
 def compare_in_flight(
     decision: Decision, situation: Situation, candidate: Candidate
 ) -> Decision:
-    """Add to the decision on a pair a clearly better pair of the same flight, or the td range in which there is none.
+    """Add to the decision on a pair a clearly better pair of the same flight, or the td range without a better pair.
 
     The flight is searched only if another time may be better, and no better pair whose residual is at most 0.5 is yet
     known.
@@ -539,7 +539,7 @@ def suggest_at(
 
 
 def find_better_pair(situation: Situation) -> Pair | None:
-    """Return the pair recommended at the energy peak closest to td that has such a pair; None if no peak has one.
+    """Return the recommended pair at the nearest energy peak for which a pair is recommended; None if there is none.
 
     The record is examined anew at that td, so that the pair is what ``suggest`` recommends for that td.
     """
@@ -572,7 +572,7 @@ def find_better_pair(situation: Situation) -> Pair | None:
 
 
 def find_good_pair(situation: Situation) -> Pair | None:
-    """Return a pair whose grade is not "poor": the recommended one at this td, otherwise a better one at another td."""
+    """Return a pair whose grade is not "poor": the recommended pair at this td or else a better pair at another td."""
     answer = suggest_at(situation)
     if answer.decision and answer.decision.grade != POOR:
         return answer.recommended
@@ -587,7 +587,7 @@ def _drop_poor(pair: Pair | None) -> Pair | None:
 
 
 def _is_level_refused(situation: Situation) -> bool:
-    """Return True if no tr can match the energy level at td, because that level is negative or too high.
+    """Return True if no tr can match the energy level at td because the level is negative or too high.
 
     This test saves time, since noise makes thousands of such peaks.
     """
@@ -606,15 +606,15 @@ def _find_saving_pair(situation: Situation) -> Pair | None:
 
 
 def _examine_anew(situation: Situation, td: float) -> Situation:
-    """Examine the same record at another td, in the same way as at a td given by the user."""
-    # The oscillator is fitted again, but the slow search for the reason of a refusal is skipped.
+    """Examine the same record at another td in the same way as at a td given by the user."""
+    # The oscillator is fitted again, but the slow search for the reason of its refusal is skipped.
     quick = situation.evidence.span is None
     return examine_td(situation.history, td, situation.settings, quick=quick)
 
 
 def _is_admissible_as_printed(situation: Situation, tr: float, td: float) -> bool:
     """Return True if ``verify`` accepts a pair once it is rounded to the six printed digits."""
-    # RangeError means that rounding has moved a time beyond the record or made both times equal.
+    # RangeError means that rounding moved a time out of the record, or made both times equal.
     try:
         return verify_at(
             _examine_anew(situation, round_as_read(td)), round_as_read(tr)
@@ -702,7 +702,7 @@ def _refuse_switched(situation: Situation) -> None:
 
 
 def _add_choice_in_flight(answer: PairSuggestion) -> PairSuggestion:
-    """If the pair for a given td is not good, add the result of searching its flight to the answer."""
+    """Add to the answer for a given td the result of a search in its flight if the pair is not good."""
     best, decision = answer.chosen, answer.decision
     if best is None:
         choice = _choose_in_flight(answer.situation)
@@ -733,7 +733,7 @@ def verify_run(
 
 
 def _add_health(answer: _Answer, run: OpenedRun) -> _Answer:
-    """Add the health of the run and its warnings, for the rigid window or, without a pair, for the flight up to td.
+    """Add the health of the run and its warnings, for the rigid window or, if no pair exists, for the flight up to td.
 
     The time after td does not matter for the choice.
     """

@@ -1,4 +1,4 @@
-"""Judge the health of a run: the reliability of its energies, the loads that act in the window, and reasons to refuse.
+"""Judge the health of a run: whether its energies are reliable, which loads act in the window, and why it is refused.
 
 A term that the files lack gives None, never 0.  Shares are relative to the peak of the internal energy, as is usual
 in practice, and are None if that peak is tiny.
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.names import Part
 
 # Largest hourglass energy as a fraction of the peak internal energy, for the model and for each part [-].
-# One source of the hourglass limit is the rule of thumb of DYNAmore (dynasupport.com/howtos/element/hourglass).
+# One source of the hourglass limit is a rule of thumb by DYNAmore (dynasupport.com/howtos/element/hourglass).
 # Another source of the hourglass limit is NCHRP Web-Only Document 179 (2010), table E-1.
 MOST_HOURGLASS = 0.10
 # Largest relative change of the total energy [-] (source: NCHRP Web-Only Document 179 (2010), table E-1).
@@ -35,13 +35,13 @@ MOST_IMBALANCE = 0.10
 # MOST_SLIDING: largest contact energy without friction, as a fraction of the peak internal energy [-].
 # The source of MOST_SLIDING is dynasupport.com/howtos/general/contact-energy.
 # MOST_NEGATIVE_SLIDING: largest absolute value of a negative contact energy, relative to the peak internal energy [-].
-# A negative contact energy has no physical cause but comes from penetrations; the check by Oasys allows 5 %.
+# A negative contact energy has no physical cause; it results from penetrations. The check by Oasys allows 5 %.
 MOST_SLIDING, MOST_NEGATIVE_SLIDING = 0.10, 0.05
 # Largest internal energy that is treated as 0 [energy]; LS-DYNA energies start at 2e-20 per process.
 _FLOOR: Final = 1e-15
-# Largest internal energy of parts that are ignored, as a fraction of the largest part energy [-].
+# Parts whose internal energy is at most this fraction of the largest part energy are ignored [-].
 _SMALL_PART = 0.01
-# The energy ratio is used only if the reference energy is at least this fraction of its peak [-].
+# The energy ratio is used if the reference energy is at least this fraction of its peak [-].
 # If the reference energy is small, even a small error gives a large energy ratio (source: Altair, Radioss FAQ).
 _COUNTING_REFERENCE = 0.1
 # Code of the warning about an engine version that reports wrong energies.
@@ -50,21 +50,21 @@ WRONG_ENERGY: Final = "engine-wrong-energy"
 OF_THE_MODEL = ("contact-in-window", "work-in-window")
 
 _UNRELIABLE: Final = "do not rely on the internal energy"
-# _WITHIN: the criteria below compare a state with all states earlier by more than this fraction of the record [-].
+# _WITHIN: the criteria below compare a state with all states that are earlier by this fraction of the record [-].
 # _GAIN: smallest ratio of the kinetic energy of a diverged run to the largest earlier energy [-].
 # _SPEED: smallest ratio of the kinetic energy of a diverged run to the internal energy [-].
-# _TORN: smallest ratio of the internal energy of a diverged run, whose elements are torn, to its earlier maximum [-].
-# Sound runs do not meet all three criteria of a diverged run, because a load that accelerates a body also deforms it.
+# _TORN: smallest ratio of the internal energy of a diverged run to its earlier maximum, as its elements tear [-].
+# No sound run meets all three criteria of a diverged run, because a load that accelerates a body also deforms it.
 _WITHIN: Final = 1 / 20
 _GAIN, _SPEED, _TORN = 1e9, 1e6, 1e3
-# A diverged run is recognised only after this many states with energy, because the first states may be round-off.
+# A diverged run is recognised only after this many states with energy; the first states may be round-off.
 _FEWEST: Final = 12
 # Largest energy that is treated as zero in any unit system, because LS-DYNA energies start at 2e-20 [energy].
 _NOTHING: Final = 1e-20
 
 
 class Health(NamedTuple):
-    """Health of a run up to the time ``until``; the fields are the keys of the JSON output, None if a value is unknown.
+    """Health of a run up to the time ``until``. The fields are the keys of the JSON output; None if a value is unknown.
 
     Shares refer to the peak internal energy of the model; ``part_hourglass_share`` to that of ``part``, the worst of
     the chosen parts.  The energy ratio is the total energy over the initial energy and the external work.  The last
@@ -135,7 +135,7 @@ def assess_health(
 
 
 def _explain_few_states(balance: Balance, window: tuple[float, float]) -> str | None:
-    """Return a message if the window has too few states to distinguish a load from gravity, otherwise None."""
+    """Return a message if the window has too few states to tell a load from gravity; otherwise None."""
     states = int(
         np.count_nonzero((balance.time >= window[0]) & (balance.time <= window[1]))
     )
@@ -249,7 +249,7 @@ def _subtract_friction(balance: Balance) -> Samples | None:
 
 
 def _find_worst_part(balance: Balance) -> dict[str, Any]:
-    """Return the largest hourglass energy fraction among the parts, and the part, as fields of `Health`."""
+    """Return, as fields of `Health`, the largest hourglass energy fraction of any part, and this part."""
     smallest_peak = max(
         _FLOOR,
         _SMALL_PART * max((e for _, _, e in balance.hourglass_of_parts), default=0.0),
@@ -264,7 +264,7 @@ def _find_worst_part(balance: Balance) -> dict[str, Any]:
 
 
 def _find_ratio_range(balance: Balance) -> dict[str, Any]:
-    """Return the range of the energy ratio over the times with a large enough reference energy, as fields of `Health`.
+    """Return, as fields of `Health`, the range of the energy ratio over the times with a sufficient reference energy.
 
     The ratio is that of the solver or, if the files lack it, is computed from the terms.
     """
@@ -309,7 +309,7 @@ def _compute_total(balance: Balance) -> Samples | None:
 def _measure_window(
     balance: Balance, start: float, end: float, locked: float | None
 ) -> dict[str, Any]:
-    """Return the changes of contact and eroded energy, and the work, in the window, relative to its internal energy."""
+    """Return the changes of contact and eroded energy and the work in the window, relative to its internal energy."""
     inside = within(balance.time, start, end)
     if locked is None and balance.internal is not None:
         if balance.time[inside].size:
@@ -324,7 +324,7 @@ def _measure_window(
         ("window_eroded", balance.eroded),
     ):
         if energy is not None and energy[inside].size:
-            # The quantum is the rounding error of the energy, which depends on the number of printed digits.
+            # The quantum is the rounding error of the energy, which follows from the number of printed digits.
             quantum = balance.precision.quantum(float(np.abs(energy[inside]).max()))
             fields[name] = max(0.0, float(np.ptp(energy[inside])) - quantum) / locked
     work = compute_work_beyond_gravity(balance, start, end)
@@ -364,7 +364,7 @@ def refuse_unsound(
 
 
 def list_flaws(history: History) -> Iterator[Caution]:
-    """Yield the reasons why a run cannot be judged, with stable codes."""
+    """Yield the reasons why a run cannot be judged, each with a stable code."""
     highest = find_largest(history.energy)
     if highest > LARGEST_ENERGY:
         yield Caution(
@@ -381,7 +381,7 @@ def list_flaws(history: History) -> Iterator[Caution]:
 
 
 def _describe_divergence(history: History) -> str | None:
-    """Return a message with the time at which the energy diverges; None if the run is sound."""
+    """Return a message with the time at which the energy diverges; None if it does not."""
     balance = history.balance
     if (
         balance is None
@@ -393,7 +393,7 @@ def _describe_divergence(history: History) -> str | None:
     time = balance.time
     kinetic = np.abs(balance.kinetic)
     internal = np.abs(balance.internal)
-    # This array counts, for each state, the states that are earlier by more than the fraction _WITHIN of the record.
+    # This array gives, for each state, the number of states that are earlier by more than the fraction _WITHIN.
     earlier = np.searchsorted(time, time - _WITHIN * (time[-1] - time[0]))
     counted = (
         np.concatenate([[0], np.cumsum(kinetic + internal > 0)])[earlier] >= _FEWEST

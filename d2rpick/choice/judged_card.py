@@ -1,4 +1,4 @@
-"""Print D2R cards whose times were judged with an energy history."""
+"""Print D2R cards with times that were judged by means of an energy history."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def complete_printing(printing: Printing, history: History) -> Printing:
-    """Fill in missing options of a card from a history, such as the solver and the parts.
+    """Fill in missing options of a card, such as the solver and the parts, from a history.
 
     The history defines the solver, the chosen parts, the end of the run, and the times at which a contact force acts.
     """
@@ -44,7 +44,7 @@ def list_switched(printing: Printing) -> tuple[int, ...]:
 
 
 def add_deck_bodies(printing: Printing, settings: Settings) -> Printing:
-    """Add the rigid bodies of a deck as merged parts, and keep its inactive bodies inactive."""
+    """Add the rigid bodies defined in a deck as merged parts, and keep its inactive bodies inactive."""
     bodies = tuple(body.parts for body in settings.bodies or ())
     replaced = (*printing.node, *printing.replaced)
     inactive = tuple(node for node in settings.kept_off if node not in replaced)
@@ -52,7 +52,7 @@ def add_deck_bodies(printing: Printing, settings: Settings) -> Printing:
 
 
 def _add_pushes(printing: Printing, history: History, solver: str) -> Printing:
-    """Add the times at which the named contact or rigid wall exerts a force, and the parts' closing speed.
+    """Add the times at which the named contact or rigid wall exerts a force, and the closing speed of the parts.
 
     The times follow from the contact force in the file, or else from the part momenta; the speed only from momenta.
     """
@@ -99,7 +99,7 @@ def print_judged_card(
     printing: Printing,
     done: Sequence[Times] = (),
 ) -> tuple[PrintedCard, tuple[PairVerdict, ...]] | None:
-    """Print the card for windows, with the verdicts that ``judge`` returns for the printed times tr and td.
+    """Print the card for windows with the verdicts that ``judge`` returns for the printed values of tr and td.
 
     The history completes ``printing``.  In the windows ``done`` the run is already switched: they are printed too, but
     this run cannot show whether they are good.  The result is None if the parts, or for some solvers the main nodes,
@@ -122,7 +122,7 @@ def print_judged_card(
 
 
 def _narrow_windows(windows: Sequence[Times], history: History) -> tuple[Times, ...]:
-    """Return the windows to judge; windows that depend on a force are narrowed to the output states within them."""
+    """Return the windows to judge. Windows that depend on a force are narrowed to the output states within them."""
     from d2rpick.flight.contact_times import (
         narrow_to_states,
     )  # Imported here to keep start-up fast.
@@ -134,7 +134,7 @@ def _narrow_windows(windows: Sequence[Times], history: History) -> tuple[Times, 
 def _list_card_remarks(
     done: Sequence[Times], history: History, verdicts: Sequence[PairVerdict]
 ) -> Iterator[str]:
-    """Yield comments for the card: unjudged windows, the energy level of the whole model, and the verdicts."""
+    """Yield comments for the card: windows without a verdict, the energy level of the whole model, and the verdicts."""
     if done:
         windows = ", ".join(f"{tr:.6g} to {td:.6g}" for tr, td in done)
         yield f"{', '.join(history.source)} was rigid from {windows}: these windows are done and not judged again."

@@ -29,7 +29,7 @@ _QUANTITIES: Final = {"kinetic_share": "kinetic fraction"}
 
 
 class Limit(NamedTuple):
-    """A limit that a recommended pair must meet. A pair whose value is unknown does not meet the limit.
+    """A limit that a recommended pair must meet. An unknown value does not meet it.
 
     ``quantity`` is a column of judged candidates, or an attribute of the situation at td.  If ``is_lower`` is True, the
     value must not be below the limit, otherwise not above it.
@@ -39,7 +39,7 @@ class Limit(NamedTuple):
     is_lower: bool = False
 
     def is_kept_by(self, values: Any, limit: float) -> Any:
-        """Return True for each of the ``values`` that meets the limit; NaN is an unknown value, which does not meet it.
+        """Return True for each of the ``values`` that meets the limit; an unknown value (NaN) does not meet it.
 
         Examples
         --------
@@ -49,7 +49,7 @@ class Limit(NamedTuple):
         return values >= limit if self.is_lower else values <= limit
 
     def explain(self, value: float | None, limit: float) -> str:
-        """Return the message that a value exceeds the limit, or that the value is unknown.
+        """Return the message that a value exceeds the limit or is unknown.
 
         Examples
         --------
@@ -84,7 +84,7 @@ class Use(NamedTuple):
 
 
 def _describe_use(**use: Any) -> dict[str, Use]:
-    """Return dataclass-field metadata that describe how an option is used."""
+    """Return metadata of a dataclass field that describe how an option is used."""
     return {"use": Use(**use)}
 
 
@@ -117,7 +117,7 @@ class ChoiceOptions:
         metadata=_describe_use(of_cards=True),
     )
     tolerance: float = make_option(
-        "Largest frozen-deformation error, or level error if no oscillator describes the record.",
+        "Largest frozen-deformation error, or level error with the basis energy; no effect with the basis modal.",
         FRACTION,
         "L",
         default=0.2,
@@ -166,7 +166,7 @@ class ChoiceOptions:
         "C",
         metadata=_describe_use(of_sets=False, is_advanced=True),
     )
-    # Rigid elements do not limit the time step, so it cannot be smaller than that of the deformable run.
+    # Rigid elements do not limit the time step, so the step cannot be smaller than that of the deformable run.
     step_ratio: float | None = make_option(
         "Time step while the parts are rigid, divided by the time step before, 1 or more.  [default: 1]",
         AT_LEAST_ONE,

@@ -57,21 +57,21 @@ _LS_DYNA: Final = "*DATABASE_MATSUM"
 
 
 class PartOverview(NamedTuple):
-    """A part and its highest internal energy; None if the energy is missing in some or all states."""
+    """A part and its highest internal energy; None if the energy is missing in any state."""
 
     part: Part
     energy_max: float | None
 
 
 class ForceOverview(NamedTuple):
-    """A contact or rigid wall, and the intervals ``acts`` (start, end) in which it acts on parts [time]."""
+    """A contact or rigid wall, and the intervals ``acts`` (start, end) during which it acts on parts [time]."""
 
     name: str
     acts: tuple[tuple[float, float], ...]
 
 
 class Sampling(NamedTuple):
-    """Smallest, usual and largest output interval [time]."""
+    """Smallest, most frequent and largest output interval [time]."""
 
     min: float
     median: float
@@ -142,7 +142,7 @@ class Overview(NamedTuple):
 
     @property
     def _is_spent(self) -> bool:
-        """True if parts were rigid and no flight begins afterwards."""
+        """True if parts were rigid and no flight begins after they were rigid."""
         last = max((end for _, end in self.rigid), default=None)
         return last is not None and all(
             flight.start < last for _, flight in self.flights
@@ -177,7 +177,7 @@ class Overview(NamedTuple):
 
 
 def _describe_flights(flights: Sequence[tuple[str, FreeFlight]]) -> str:
-    """Describe the number of flights and the duration of the longest."""
+    """Describe the number of flights and the duration of the longest flight."""
     longest = max(flight.end - flight.start for _, flight in flights)
     count = f"{len(flights)} free flight{'s' * (len(flights) > 1)}"
     return f"{count}, the longest for {longest:.6g}"
@@ -196,7 +196,7 @@ def _describe_health(health: Health | None) -> str:
 def describe_run(
     run: OpenedRun, selection: Selection, deck: str | None = None
 ) -> Overview:
-    """Describe all databases of a run; ``selection`` and ``deck`` determine which flights are found."""
+    """Describe all databases of a run. The flights that are found depend on ``selection`` and ``deck``."""
     deck_warnings: tuple[Caution, ...] = ()
     if deck is not None:
         run, deck_warnings = _apply_deck(run, deck)
@@ -279,7 +279,7 @@ def _read_times(first: Legs) -> tuple[Samples, str | None]:
 def _list_notes(
     run: OpenedRun, selection: Selection, refusal: str | None
 ) -> Iterator[str]:
-    """Yield notes on what the readers omitted or assumed, and the message ``refusal`` if the times are unreadable."""
+    """Yield notes on what the readers omitted or assumed, and the message ``refusal`` if the times cannot be read."""
     yield from run.left_out
     for database in run.databases:
         yield from _read_notes(database)
@@ -300,7 +300,7 @@ def _measure_sampling(time: Samples) -> Sampling | None:
 
 
 def _apply_deck(run: OpenedRun, deck: str) -> tuple[OpenedRun, tuple[Caution, ...]]:
-    """Add the supports, gravity and joints defined in a deck to the run, with warnings; raise DeckError on failure."""
+    """Add the supports, gravity and joints that a deck defines to the run, and warnings; raise DeckError on failure."""
     # Imported here to keep start-up fast.
     from d2rpick.choice.parts.deck_of_run import (
         add_surroundings,
@@ -317,7 +317,7 @@ def _apply_deck(run: OpenedRun, deck: str) -> tuple[OpenedRun, tuple[Caution, ..
 
 
 def _name_missing_output(run: OpenedRun) -> str:
-    """Name the solver output that would contain the part momenta missing from these files."""
+    """Name the solver output that would contain the part momenta that these files lack."""
     written = {database.format for database in run.databases}
     if written & {"radioss-th"}:
         output = _RADIOSS
@@ -348,7 +348,7 @@ def _list_part_overviews(run: OpenedRun) -> Iterator[PartOverview]:
         energies = give_if_written(lambda: run.part_energies(run.parts))
     else:
         energies = np.empty((0, 0))
-    if energies is None:  # The part is missing in some states.
+    if energies is None:  # The energy of the part is missing in some states.
         return (
             PartOverview(part, _find_highest_energy_of_part(run, part))
             for part in run.parts
@@ -388,7 +388,7 @@ def _assess_health_of_run(
     flights: Sequence[FreeFlight],
     rigid: Sequence[Times],
 ) -> Health | None:
-    """Return the health of the run outside its rigid windows; None if the run has no energies."""
+    """Return the health of the run outside its rigid windows; None if no energies were written."""
     balance = read_balance(
         run.databases, run.parts, known=history.balance if history else None
     )
@@ -416,7 +416,7 @@ def _assess_health_of_run(
 
 
 def _read_history(run: OpenedRun, selection: Selection) -> History | None:
-    """Return the history to be judged; None if the user has to choose an energy, or if there is no state."""
+    """Return the history to be judged; None if the user has to choose an energy or there is no state."""
     if selection.parts:
         selection = replace_words_by_part_ids(run, selection)
     for wanted in (selection.parts, selection.flying):
@@ -453,7 +453,7 @@ def _warn_about_flights_outside(
 def _find_flights_to_choose_from(
     history: History,
 ) -> tuple[tuple[str, FreeFlight], ...]:
-    """Return the flights from which ``plan`` and ``suggest`` choose, with their sources; empty for a refused run."""
+    """Return the flights from which ``plan`` and ``suggest`` choose, and their sources; empty for a refused run."""
     try:
         settings = Settings()
         refuse_unsound(history, settings)

@@ -44,7 +44,7 @@ class Reference(NamedTuple):
         return cls(run, run.history(selection))
 
     def like(self, run: OpenedRun, selection: Selection = _DEFAULT) -> Reference:
-        """Read the same parts from another run of the same model, even if the selection named them differently."""
+        """Read the same parts from another run of the model, even if the selection gave them different names."""
         ids = tuple(str(part.id) for part in self.history.parts or ())
         springs = tuple(str(part.id) for part in self.history.springs)
         run = run.within(self.run.surroundings)

@@ -1,4 +1,4 @@
-"""Provide the command line: a thin layer around the library, and the only place that prints or exits.
+"""Provide the command line: a thin layer on top of the library, and the only place that prints or exits.
 
 Commands are imported when they are called, and heavy modules inside the commands, so that ``--help`` stays fast.
 """
@@ -52,14 +52,15 @@ COULD_NOT_RUN: Final = 2
 BROKEN_PIPE: Final = 141  # Exit code that a shell reports if SIGPIPE ended the program.
 _Made = TypeVar("_Made", bound=click.Command)
 _LIBRARIES: Final = ("click", "numpy", "scipy", "pandas", "h5py", "matplotlib")
-
+# Largest difference in similarity between the best match for a mistyped option and others that are suggested [-].
+_LESS_ALIKE: Final = 0.1
 _VERSIONS: Final = (
     "Show the version, and those of the libraries it stands on, and exit."
 )
 
 
 class _PipeClosed(Exception):  # noqa: N818  this is not an error: the reader of the pipe needs no more output
-    """Exception that carries BrokenPipeError past click, which would exit with code 1, the code of a failed check."""
+    """Exception that carries a BrokenPipeError past click, which would exit with 1, the code of a failed check."""
 
 
 def _show_help(ctx: click.Context, _: click.Parameter, value: bool) -> None:
@@ -100,10 +101,6 @@ class Documented(click.Command):
             for line in (self.epilog or "").split("\n")
         ]
         formatter.write("\n" + "\n".join(lines) + "\n")
-
-
-# Only options that resemble a mistyped one almost as well as the best match are suggested, to within this limit [-].
-_LESS_ALIKE: Final = 0.1
 
 
 class _CommandGroup(Documented, click.Group):
@@ -160,7 +157,7 @@ class _CommandGroup(Documented, click.Group):
             raise _PipeClosed from error
         except (click.ClickException, click.exceptions.Exit, click.Abort):
             raise
-        except Exception as error:  # The user gets a one-line message for any error.
+        except Exception as error:  # For any error, the user gets a one-line message.
             if _is_interrupt(error):
                 raise click.Abort from None
             from d2rpick.cli.output import explain_error
@@ -223,7 +220,7 @@ def _format_usage_error(error: click.UsageError) -> str:
 
 
 def _is_interrupt(error: BaseException | None) -> bool:
-    """Return True if an interrupt caused the error; Python replaces an interrupt while it creates a class."""
+    """Return True if an interrupt caused the error. Python replaces an interrupt while it creates a class."""
     while error and not isinstance(error, KeyboardInterrupt):
         error = error.__cause__ or error.__context__
     return error is not None
@@ -265,7 +262,7 @@ def make_documented(cls: type[_Made], **settings: Any) -> Callable[[Any], _Made]
         help_text, _, examples = cleandoc(function.__doc__).partition(
             "\n\nExamples\n--------\n"
         )
-        # Each command in the examples is on one line.
+        # In the examples, each command is on one line.
         lines = examples.replace("\\\n    ", "").split("\n")
         epilog = "\n".join(["Examples:", *(f"  {line}" for line in lines)])
         return click.command(

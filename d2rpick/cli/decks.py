@@ -86,7 +86,7 @@ def card(
 def _read_windows(
     tr: Sequence[float], td: Sequence[float], file: str | None
 ) -> Sequence[tuple[float, float]]:
-    """Return the windows from pairs of times or from a file; raise UsageError if neither contains windows."""
+    """Return the windows from pairs of times or from a file; raise UsageError if there are none."""
     if file is not None:
         if tr or td:
             raise click.UsageError("--windows excludes --tr and --td")

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def write_manual() -> str:
-    """Return the page of the whole program in roff, with a section for each command."""
+    """Return the page of the whole program in roff, with a section per command."""
     context = click.Context(d2rpick, info_name="d2rpick", **d2rpick.context_settings)
     assert isinstance(d2rpick, click.Group)
     lines = [
@@ -83,7 +83,7 @@ def _write_item(name: str, text: str) -> tuple[str, ...]:
 
 
 def _write_text(text: str) -> str:
-    r"""Escape a line for roff, so that backslashes and hyphens appear as typed and no line becomes a request.
+    r"""Escape a line for roff so that backslashes and hyphens appear as typed and no line becomes a request.
 
     Examples
     --------

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 _NEEDED: Final = {"required": True}
 
-# Columns of the solver tables, keyed by type of table; each table also has the column time_s.
+# Columns of the solver tables, by type of table; each table also has the column time_s.
 SOLVER = {
     "pairs": ("reference_m", "published_m", "better_m"),
     "run": ("z_m", "y_m", "vz_mps", "vy_mps"),
@@ -107,7 +107,7 @@ def rollover(box: Box, output: Output) -> None:
 
 
 def _run(box: Box, output: Output) -> None:
-    """Compute one run; a plot also needs the reference run."""
+    """Compute one run and, for a plot, the reference run."""
     from d2rpick.report.history_files import BOX_WRITERS, choose_history_format
 
     form = box.write_as or choose_history_format(output.output_file, HISTORIES)
@@ -173,9 +173,10 @@ def reproduce(
 ) -> None:
     """Reproduce the published results as figures (svg, png) and tables (csv), section by section.
 
-    For each figure, in the order of the paper, it prints what the paper shows, what is found here, and whether the two
-    agree: yes, in part or no.  Published numbers and reference values follow next to those found here.  The figures of
-    the box (sections 1 and 4) take about a minute.  It runs from a clone of the repository, with its folder validation.
+    For each figure, in the order of the paper, d2rpick prints what the paper shows, what d2rpick computes, and whether
+    the two agree: yes, in part or no.  Published numbers and reference values follow next to the computed values.  The
+    figures of the box (sections 1 and 4) take about a minute.  The command works only in a clone of the repository,
+    because it needs the folder validation.
 
     Examples
     --------

@@ -136,8 +136,9 @@ def suggest(
 
     If you omit --td, d2rpick chooses both times, in --td-window or in the longest flight.
 
-    A candidate is a time before td at which the internal energy has the same level as at td.  d2rpick verifies each
-    candidate with the floating oscillator that describes the record.  It recommends the best candidate and a better td.
+    A candidate is a time before td at which the parts have nearly the same deformation as at td.  d2rpick judges each
+    candidate by the vibration model that fits the record.  It recommends the best candidate, and names a better td if
+    there is one.
 
     Examples
     --------
@@ -186,7 +187,7 @@ def suggest(
         times = options.write_times(td=td, td_window=td_window)
         output.answer(answer, question=question.repeated._replace(times=times))
         decision = answer.decision
-    # The best pair for a given td is shown even if it is poor; in this case, the answer and the card say so.
+    # The best pair for a given td is shown even if it is poor; the answer and the card then say so.
     min_quality = request.min_quality or ("poor" if td is not None else "fair")
     _finish_answer(output, question, decision, min_quality)
 
@@ -239,9 +240,9 @@ def explore(
 ) -> None:
     """Show for each time td to switch back the best tr, the error, and the saving.
 
-    It compares evenly spaced values of td, and every peak of the energy, in --td-window or in the longest flight.  It
-    judges each td as `suggest --td` does.  The table lists the pairs that no other pair beats in both error and rigid
-    time.  d2rpick also names the nearest td with half the error.
+    d2rpick compares evenly spaced values of td, and every peak of the energy, in --td-window or in the longest flight.
+    It judges each td as `suggest --td` does.  The table lists the pairs that no other pair beats in both error and
+    rigid time.  d2rpick also names the nearest td with half the error.
 
     Examples
     --------
@@ -287,7 +288,7 @@ def explore(
 @options.make_click_option(
     "min_mean_energy",
     Option(
-        "Lowest allowed ratio of the mean energy after td to that of the reference run; the highest is as far above 1.",
+        "Smallest allowed mean energy after td, divided by the mean energy of the reference run; the largest is 2 - E.",
         FRACTION,
         "E",
     ),
@@ -335,6 +336,8 @@ def verify(
         question=question.repeated._replace(times=times),
         page=output.report or "",
     )
+    if answer.switched and answer.switched.objections:
+        output.finish_with_failed_comparison()
     _finish_answer(output, question, answer.decision, question.settings.min_quality)
 
 
@@ -520,7 +523,7 @@ def plan(
 
 
 def _select_new_cautions(card: JudgedCard | None, plan: Plan) -> list[Caution]:
-    """Return the cautions about the card that the plan does not contain, such as those about unverified windows."""
+    """Return the cautions about the card that the plan lacks, e.g. those about windows without a verdict."""
     if card is None:
         return []
     failed = tuple(
@@ -536,7 +539,7 @@ def _select_new_cautions(card: JudgedCard | None, plan: Plan) -> list[Caution]:
 
 
 def _check_deck(request: Request, cards: Cards, form: str, folder: str | None) -> None:
-    """Before a file is opened, refuse to copy a deck that is not given or to write a card that switches no parts."""
+    """Before any file is opened, refuse to copy a deck that is not given or to write a card that switches no parts."""
     if folder is not None and request.deck is None:
         raise ArgumentError(
             "--write-deck needs `deck`, the deck that is copied with the cards"

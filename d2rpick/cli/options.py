@@ -73,11 +73,11 @@ GROUPS: Final[dict[str, tuple[str, ...]]] = {
     ),
     "Advanced": ADVANCED,
 }
-# Options that write files; if the command is repeated, these files already exist.
+# Options that write files, which already exist if the command is repeated.
 _WRITTEN: Final = ("output_file", "plot", "report", "write_deck")
 _PAIRS: Final = ("td_window",)
 _ASKS_FOR_SETTINGS: Final = "--show-settings"
-# Key in the context of click for a flag that is True if only the settings are shown.
+# Key in click's context for a flag that is True if only the settings are shown.
 _SETTINGS_ONLY: Final = "d2rpick.settings-only"
 _SOURCES: Final = {
     ParameterSource.COMMANDLINE: "command line",
@@ -110,7 +110,7 @@ class Command(Documented):
         return remaining
 
     def get_params(self, ctx: click.Context) -> list[click.Parameter]:
-        """Return the parameters; none of them is required if only the settings are shown."""
+        """Return the parameters, none of which is required if only the settings are shown."""
         parameters = super().get_params(ctx)
         if ctx.meta.get(_SETTINGS_ONLY):
             return [_make_optional(parameter) for parameter in parameters]
@@ -161,7 +161,7 @@ class Command(Documented):
 
 
 def _make_optional(parameter: click.Parameter) -> click.Parameter:
-    """Return a copy of a parameter in which the parameter is not required."""
+    """Return a copy of a parameter that is not required."""
     optional = copy(parameter)
     optional.required = False
     return optional
@@ -196,7 +196,7 @@ def make_command(function: Decorated) -> click.Command:
 def add_options(
     *names: str, of: Sequence[Any] = TABLES, forms: Iterable[str] = (), **overrides: Any
 ) -> Callable[[Decorated], Decorated]:
-    """Give a command the options of tables. The command receives one object per table, named like the table.
+    """Give a command the options of tables. It receives one object per table, under the name of the table.
 
     Parameters
     ----------
@@ -385,7 +385,7 @@ def _keep_in_context(ctx: click.Context, option: click.Parameter, value: bool) -
     ctx.meta[f"d2rpick.{make_option_name(option.name or '')}"] = value
 
 
-# Options that every command accepts but does not use itself; they are kept in the context of click.
+# Options that every command accepts but does not use itself; click's context keeps them.
 _FLAGS: Final = [
     _share_option(
         click.option(
@@ -461,7 +461,7 @@ def insert_options(command: Sequence[str], words: Sequence[str]) -> tuple[str, .
 
 
 def _list_settings(ctx: click.Context) -> Iterator[str]:
-    """Yield a line for every option with its value and the source of this value."""
+    """Yield a line for every option with its value and the source of the value."""
     from d2rpick.report.tables import as_json
 
     for parameter in ctx.command.get_params(ctx):

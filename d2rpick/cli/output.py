@@ -38,11 +38,11 @@ if TYPE_CHECKING:
 OBJECTION = 1
 # Smallest terminal width to which a result is wrapped [columns].
 _NARROWEST: Final = 40
-# Output formats, keyed by the suffix of the file name.
+# Output formats by the suffix of the file name.
 _NAMED: Final = {".json": "json", ".ndjson": "ndjson", ".csv": "csv", ".md": "markdown"}
-# Suffixes of files that users may expect for a report, but that are not supported.
+# Suffixes of unsupported files that users may expect for a report.
 _PRINTED: Final = (".pdf", ".doc", ".docx")
-# Pattern of the lines of a result that are bold: recommendations, verdicts, and findings of rules.
+# Pattern of those lines of a result that are bold: recommendations, verdicts, and findings of rules.
 _VERDICTS: Final = "use|use with care|do not use|no pair to use|common tr"
 _ANSWER: Final = rf"(?m)^(\* |(  )?({_VERDICTS})\b|  .*:\d+:\d+: (error|warning) D2R).*"
 # Code of the warning about a truncated file.
@@ -71,7 +71,7 @@ class VerdictOnPair(Protocol):
 
 @dataclass(eq=False, repr=False)
 class Output:
-    """Output that writes results to stdout or a file, and messages to stderr; it never overwrites ``inputs``."""
+    """Output that writes results to stdout or a file, and messages to stderr. It never overwrites ``inputs``."""
 
     plot: str | None = make_option(
         "Draw energy and motion to FILE (png, svg, pdf).", "output", "FILE"
@@ -111,11 +111,11 @@ class Output:
 
     @property
     def columns(self) -> int:
-        """Width of the terminal on which the result is shown [columns]; 0 if the result is not shown on a terminal."""
+        """Width of the terminal on which the result is shown [columns]; 0 if it is not shown on a terminal."""
         return 0 if self.file else measure_columns(sys.stdout) or 0
 
     def beside(self, *inputs: str | None) -> Output:
-        """Return an output that protects these inputs; raise D2RPickError if it would overwrite an input."""
+        """Return an output that protects these inputs; raise D2RPickError if it would overwrite one of them."""
         output = replace(
             self, inputs=tuple(name for name in inputs if name not in (None, "-"))
         )
@@ -192,7 +192,7 @@ class Output:
     def finish_by_verdict(
         self, decision: VerdictOnPair | None, min_quality: str
     ) -> None:
-        """Exit with code 1 if there is no pair or if its grade is below ``min_quality``; a message states the grade."""
+        """Exit with code 1 if there is no pair or its grade is below ``min_quality``; a message states the grade."""
         if decision is None or decision.reaches(min_quality):
             self.finish(objection=decision is None)
             return
@@ -317,8 +317,17 @@ class Output:
             )
         self.finish(objection=True)
 
+    def finish_with_failed_comparison(self) -> None:
+        """Exit with code 1, because the finished switched run disagrees with the reference run."""
+        if not self.exit_zero:
+            tell(
+                f"d2rpick: exit code {OBJECTION}: the comparison with the switched run failed, which --min-quality "
+                "does not accept"
+            )
+        self.finish(objection=True)
+
     def write(self, name: str, content: bytes) -> None:
-        """Write a file completely or not at all; raise D2RPickError if it cannot be written."""
+        """Write a file completely or not at all; raise D2RPickError if the file cannot be written."""
         from pathlib import Path
 
         try:
@@ -342,7 +351,7 @@ def _check_report(name: str | None) -> None:
 
 
 def _find_implied_format(name: str) -> str | None:
-    """Return the format that the file name of a result implies, if the command supports it and no format was given."""
+    """Return the format that a result's file name implies, if the command supports it and no format was given."""
     ctx = click.get_current_context()
     is_given = (
         ctx.get_parameter_source("output_format")
@@ -427,7 +436,7 @@ def name_options_and_wrap(text: str, form: str, width: int = 0) -> str:
 
 
 def check_switched(purpose: str, request: Request, cards: Cards) -> None:
-    """Before a file is opened, refuse a card that switches no parts."""
+    """Before any file is opened, refuse a card that switches no parts."""
     if not (request.part or cards.node):
         problem = f"{purpose} needs --part, the parts to switch (Radioss: --node, their main nodes)"
         way_to_pass = "d2rpick card --tr T --td T --part IDS --history FILE"
@@ -438,7 +447,7 @@ def check_switched(purpose: str, request: Request, cards: Cards) -> None:
 def open_with_output(
     request: Request, output: Output, *inputs: str | None
 ) -> Iterator[tuple[Run, Output]]:
-    """Open the requested run, and yield it with an output that protects it and further ``inputs``.
+    """Open the requested run, and yield it with an output that protects the run and further ``inputs``.
 
     Everything that reads from the run belongs inside this context.
     """

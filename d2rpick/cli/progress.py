@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
     from threading import Event
 
-# Time before the first progress line and between progress lines [s].
+# Time before the first progress line, and time between progress lines [s].
 _PERIOD: Final = 1.0
 
 
@@ -60,7 +60,7 @@ class Count:
         self.total, self.done, self.taken = total, 0, -1
 
     def tell(self, done: int) -> None:
-        """Set the number of finished runs; in the first call, this is the number of results from an earlier study."""
+        """Set the number of finished runs, which in the first call is the number of results from an earlier study."""
         self.done, self.taken = done, done if self.taken < 0 else self.taken
 
     def told(self, seconds: float) -> str:
@@ -77,7 +77,7 @@ class Count:
 def show_counting(
     total: int, *, quiet: bool, period: float = _PERIOD
 ) -> Iterator[Count]:
-    """Show on a terminal how many runs are finished, as counted by the caller, and the remaining time."""
+    """Show on a terminal how many runs are finished, as counted by the caller, and how much time remains."""
     count = Count(total)
     with show_progress(count.told, quiet=quiet, period=period):
         yield count

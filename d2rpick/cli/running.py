@@ -102,9 +102,11 @@ def drive(
         --starter 'starter -i {deck} -np 4' --engine 'mpirun -np 4 engine -i {deck}'
     """
     import signal
+    from functools import partial
     from pathlib import Path
 
     from d2rpick.api.drives import Driving
+    from d2rpick.report.drive import describe_progress
 
     output = output.beside(deck)
     report = (lambda _: None) if output.quiet else tell
@@ -116,7 +118,7 @@ def drive(
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     with (
         driving.driver(resume=resume) as driver,
-        show_progress(driver.progress, quiet=output.quiet),
+        show_progress(partial(describe_progress, driver), quiet=output.quiet),
     ):
         driver.prepare()
         driver.run()
@@ -253,7 +255,7 @@ def first(
     """Write a copy of DECK that switches the parts in its first run, so that no reference run is needed.
 
     The solver makes the parts rigid when no contact force has acted for the time --wait, and deformable at the next
-    force.  For Radioss, the copy contains restart segments that sensors end, and the missing rigid bodies.  For
+    force.  For Radioss, the copy contains engine files whose runs sensors end, and the missing rigid bodies.  For
     LS-DYNA, it contains switches with contact codes.
 
     Examples

@@ -220,7 +220,7 @@ def _check_ledger(name: str | None, written: Mapping[str, str | None]) -> None:
 
 
 def _count_known(ledger: Ledger | None, sources: Sequence[str], *, quiet: bool) -> int:
-    """Print and return the number of runs whose rows are taken from an earlier study."""
+    """Print and return the number of runs whose rows come from an earlier study."""
     if ledger is None:
         return 0
     known_count = ledger.taking(sources)

@@ -14,12 +14,12 @@ if TYPE_CHECKING:
 
     from d2rpick.api.request import Request
 
-# Commands that compute runs in SI units and therefore take times in seconds.
+# Commands that compute runs in SI units and therefore expect times in seconds.
 _IN_SECONDS = ("rollover",)
-# Name of the argument that contains the files of one run.
+# Name of the argument with the files of one run.
 _ONE_RUN = "history"
 _MANY_RUNS = "run"
-# Options on which the time unit of a run depends.
+# Options that affect the time unit of a run.
 _COLUMNS = ("input_format", "time", "energy", "channel")
 
 
@@ -39,7 +39,7 @@ class TimeType(NumberType):
 
 
 def convert_typed_times(ctx: click.Context) -> None:
-    """Convert the times of a command that were typed with a unit to numbers in the unit of the run.
+    """Convert those times of a command that were typed with a unit to numbers in the unit of the run.
 
     Raises
     ------
@@ -85,7 +85,7 @@ def _convert(
 
 
 def _find_unit(ctx: click.Context) -> tuple[str, str]:
-    """Return the time unit of a command's run, empty if unknown, and the source that should name the unit."""
+    """Return the time unit of a command's run, empty if unknown, and the source that should give the unit."""
     if ctx.command.name in _IN_SECONDS:
         return "s", ""
     runs = _list_runs(ctx)
@@ -117,7 +117,7 @@ def _list_runs(ctx: click.Context) -> Sequence[Sequence[str]]:
 
 
 def _make_reading_request(ctx: click.Context) -> Request:
-    """Make a request from the command-line options that control how the history is read."""
+    """Make a request from those command-line options that control how the history is read."""
     from d2rpick.api.request import Request
 
     return Request(

@@ -1,4 +1,4 @@
-"""Define the types of option values, their completion by the shell, and their defaults from a settings file."""
+"""Define the types of option values, how the shell completes them, and their defaults from a settings file."""
 
 from __future__ import annotations
 
@@ -38,8 +38,8 @@ else:
     FloatType = click.ParamType  # This class is generic since click 8.4.
 
 CARDS: Final = tuple(list_options(Cards))
-_PAIR: Final = 2  # Number of values of an option whose value is a pair.
-# Options that apply only in combination with others; settings may set them even for commands that lack the others.
+_PAIR: Final = 2  # Number of values of an option that takes a pair.
+# Options that apply only together with others; settings may set them even for commands without these others.
 _BESIDE: Final[dict[str | None, tuple[str, ...]]] = {
     "weights": ("deck",),
     "step_ratio": ("cost_share", "deck"),
@@ -58,7 +58,7 @@ class NumberType(FloatType):
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
     ) -> float:
-        """Read a number; the error message contains the value found and the values allowed."""
+        """Read a number; the error message contains the value found and the allowed values."""
         try:
             number = float(value)
         except ValueError:
@@ -122,7 +122,7 @@ class OutputFile(File):
 
 
 class Program(click.types.StringParamType):
-    """A command to be started, or the address of a computing cluster; a settings file may set neither."""
+    """A command to be started, or the address of a computing cluster; a settings file must not set either."""
 
 
 class CompletedText(click.types.StringParamType):
@@ -151,7 +151,7 @@ class CompletedText(click.types.StringParamType):
 
 
 class Names(CompletedText):
-    """Names; semicolons separate them in an environment variable, because names may contain spaces."""
+    """Names. In an environment variable, semicolons separate them, because names may contain spaces."""
 
     envvar_list_splitter = ";"
 
@@ -207,7 +207,7 @@ def _open_typed_run(ctx: click.Context) -> Run | None:
     from d2rpick.api.runs import read
     from d2rpick.base.errors import D2RPickError
 
-    # click has not yet read any argument when it completes an option.
+    # When click completes an option, it has not yet read any argument.
     words = ctx.meta.get("d2rpick.command", ())[1:]
     try:
         return read([word for word in words if Path(word).exists()])
@@ -216,7 +216,7 @@ def _open_typed_run(ctx: click.Context) -> Run | None:
 
 
 class SolverName(CompletedText):
-    """Name of a solver whose input can be printed; the table of solvers is imported only when it is needed."""
+    """Name of a solver whose input can be printed. The table of solvers is imported only when it is needed."""
 
     name = "solver"
 
@@ -264,7 +264,7 @@ def choose_click_type(kind: Number | range | tuple[str, ...] | str) -> Any:
 def read_settings(
     ctx: click.Context, without: click.Context, table: Mapping[str, object], source: str
 ) -> dict[str, Any]:
-    """Return the option values, keyed by name, from the settings ``table`` that was read from ``source``.
+    """Return the option values by name, from the settings ``table`` that was read from ``source``.
 
     Keys at the top apply to all commands, keys in a table of a command's name to that command.  ``without`` is the
     context with the command line and the environment: settings that these exclude are ignored.
@@ -331,7 +331,7 @@ def _list_given_settings(
 def _read_value(
     ctx: click.Context, option: click.Option, value: Any, position: str
 ) -> Any:
-    """Read the value of an option; relative file names are relative to the folder of the settings file."""
+    """Read the value of an option; relative file names refer to the folder of the settings file."""
     _refuse_dangerous(option, position)
     has_list = option.multiple or option.nargs > 1
     values = value if has_list and isinstance(value, list) else [value]
@@ -438,5 +438,5 @@ def list_words(ctx: click.Context) -> Sequence[str]:
 
 
 def spell_option(option: click.Option) -> str:
-    """Return the long name of an option, in the form used in the settings."""
+    """Return the long name of an option in the form that settings use."""
     return max(option.opts, key=len)[2:]

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from d2rpick.deck.model import Inventory
 
-# Number of bytes in which a deck is recognised; titles and comments may precede its first keyword.
+# Number of bytes from which a deck is recognised; titles and comments may precede its first keyword.
 _HEAD = 64 * 1024
 
 
@@ -32,7 +32,7 @@ def read_inventory(path: str) -> Inventory:
     DeckError
         If the deck cannot be read, or has no parts.
     """
-    # These modules are imported here, because they import numpy.
+    # These modules are imported late, because they import numpy.
     from d2rpick.deck import (
         ls_dyna_inventory,
         radioss_files,
@@ -55,7 +55,7 @@ def read_inventory(path: str) -> Inventory:
 
 
 def find_time_unit(path: str) -> str:
-    """Return the time unit that a Radioss deck gives for itself and the computation; empty unless both have the same.
+    """Return the time unit that a Radioss deck gives for both itself and the computation; empty if they differ.
 
     Decks of LS-DYNA name no units.
 
@@ -103,7 +103,7 @@ def find_main_decks(folder: str) -> list[str]:
 
 
 def find_decks_of_run(folder: str) -> list[str]:
-    """Return the paths of the main decks with parts that are in the folder of a run.
+    """Return the paths of the main decks with parts in the folder of a run.
 
     Restart decks and files that contain only switching cards have none. A Radioss run is represented by its starter
     deck.
@@ -121,7 +121,7 @@ def find_decks_of_run(folder: str) -> list[str]:
 
 
 def _has_parts(path: str) -> bool:
-    """Return True if a deck has parts, or if it cannot be read."""
+    """Return True if a deck has parts or cannot be read."""
     from d2rpick.deck import radioss_files  # Imported here to keep start-up fast.
 
     try:

@@ -1,4 +1,4 @@
-"""Represent cards (keywords with data lines that are split into fields) and the parameters (``&name``) in their fields.
+"""Represent cards (keywords with data lines of fields), and the parameters (``&name``) in their fields.
 
 Numbers are evaluated on request. Each field knows its place in the file, and each parameter knows its definitions and
 where it is visible.
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 
 STANDARD, LONG = 10, 20  # Widths of a field in standard and long format [characters].
-# Pattern of the text between commas. A comma inside an expression, as in <max(1,2)>, does not separate fields.
+# Pattern of the text between commas. A comma inside an expression, e.g. <max(1,2)>, does not separate fields.
 _BETWEEN_COMMAS: Final = r"((?:[^,<]|<[^>]*>?)*),?"
 
 T = TypeVar("T", int, float, str)
@@ -47,7 +47,7 @@ _FLAG: Final = PARAMETER_FLAG["DFLAG"]
 
 
 class CardField(NamedTuple):
-    """The text of one field without surrounding spaces, and its position; the column is counted from 1."""
+    """The text of one field without surrounding spaces, and its position; columns are counted from 1."""
 
     text: str
     block: Block
@@ -76,7 +76,7 @@ Problem = tuple[CardField, str]
 
 @dataclass(eq=False, repr=False, slots=True)
 class Value(Generic[T]):
-    """The value of a field; if ``value`` is a default for an unreadable field, ``problem`` gives the reason.
+    """The value of a field. If ``value`` is a default for an unreadable field, ``problem`` gives the reason.
 
     ``place`` is the field, or the row in which it has this ``position``: most fields are never needed for a message.
     """
@@ -141,7 +141,7 @@ class Row:
 
 
 class Transform(NamedTuple):
-    """Effects of ``*INCLUDE_TRANSFORM`` on an included file: its id offsets and its time factor.
+    """Effects of ``*INCLUDE_TRANSFORM`` on an included file: id offsets and a time factor.
 
     ``scaled``: the file has another unit of mass, time or length. ``moved``: its nodes are moved.
     """
@@ -249,7 +249,7 @@ class Card:
     def _number(
         self, row: Row, position: int, default: T, kind: Callable[[float], T]
     ) -> Value[T]:
-        """Read a field as a number of the given type; parameters in the field are evaluated."""
+        """Read a field as a number of the given type, evaluating any parameters in it."""
         text = row.cell(position)
         if not text:
             return Value(default, row, "", (), position)
@@ -264,7 +264,7 @@ class Card:
         return Value(default if problem else value, row, problem, parameters, position)
 
     def positive(self, row: Row, column: CardColumn) -> float | None:
-        """Read a positive number; None if the number is not positive, or if its include file has different units."""
+        """Read a positive number; None if it is not positive or if its include file has different units."""
         number = self.real(row, column)
         if self.transform.scaled or number.problem or number.value <= 0:
             return None
@@ -304,7 +304,7 @@ _Table = dict[str, list[Definition]]
 
 
 class Scope:
-    """The parameters visible in one file; local parameters hide global parameters and parameters of including files.
+    """The parameters visible in one file. Local parameters hide global ones and those of including files.
 
     If a parameter is defined several times, the first definition is used (Vol I R17 as quoted by a converter: DFLAG 1
     warns and keeps the first), unless ``*PARAMETER_DUPLICATION`` or ``_MUTABLE`` lets a later one replace it.
@@ -318,7 +318,7 @@ class Scope:
         self._shared: _Table = {}
         self._latest_wins = False
         self._count = 0
-        # Number of definitions before a card; later definitions do not apply to this card.
+        # Number of definitions before a card; later definitions do not apply to it.
         self._known: float = math.inf
         self._seen = self
 
@@ -351,7 +351,7 @@ class Scope:
         )
 
     def definition(self, name: str) -> Definition | None:
-        """Return the definition that applies; None if the parameter has not been defined yet."""
+        """Return the definition that applies; None if the parameter is not yet defined."""
         earlier = [
             definition
             for definition in self.definitions(name)
@@ -408,7 +408,7 @@ class Scope:
                 self._whole._count += 1
 
     def _tables(self) -> Iterator[_Table]:
-        """Yield the tables of definitions, from the innermost scope out to the global scope."""
+        """Yield the tables of definitions, from the innermost scope to the global scope."""
         yield self._local
         yield from self._outer._tables() if self._outer else (self._whole._shared,)
 
@@ -479,7 +479,7 @@ def _read_definitions(
 
 
 def _read_expressions(rows: Sequence[Row]) -> Iterator[tuple[Row, str, str]]:
-    """Yield one definition per line; a line whose name field is blank continues the previous expression."""
+    """Yield one definition per line; a line with a blank name field continues the previous expression."""
     pending: tuple[Row, str, str] | None = None
     for row in rows:
         name_part, comma, value_part = row.text.partition(",")

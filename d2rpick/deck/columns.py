@@ -36,7 +36,7 @@ class CardColumn(NamedTuple):
         return self.start // WIDTH
 
     def cut(self, line: str) -> str:
-        """Return the text of this column in a line, including spaces."""
+        """Return the text in this column of a line, including spaces."""
         return line[self.start : self.start + self.width]
 
     def format(self, value: Cell) -> str:
@@ -133,7 +133,7 @@ def cut_fields(line: str) -> list[str]:
 
 
 def write_list(line: DataLine, values: Iterable[Cell]) -> Iterator[str]:
-    """Yield lines of values; in each line except the last, all columns are filled."""
+    """Yield lines of values, in which all columns except some of the last line are filled."""
     columns = list(line)
     cells = list(values)
     for first in range(0, len(cells), len(columns)):

@@ -1,4 +1,4 @@
-"""Write Radioss engine files, with the end of the engine run, the bodies to switch, and the time-step limit."""
+"""Write Radioss engine files with the end of the engine run, the bodies to switch, and the time-step limit."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ if TYPE_CHECKING:
 
     from d2rpick.deck.printed_card import Times
 
-# Smallest number of time steps in a rigid window; it must be high, because parts are released up to one step late.
+# Smallest number of time steps in a rigid window; it must be large, because parts are released up to one step late.
 # Each window has its own time-step limit, so that adding a window does not change the run before it.
 CAP_SHARE = 1000
 _NODES_PER_LINE = 10
-# Largest number of engine runs, because the names of time history files contain the number with two digits.
+# Largest number of engine runs; the names of time history files contain the number with two digits.
 MOST_LEGS = 99
 
 

@@ -24,7 +24,7 @@ _TOKEN: Final = (  # This pattern is compiled on first use to keep start-up fast
     r"\s*(?:(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?)|(?P<name>&?\s*[a-z_]\w*)|(?P<sign>\*\*|[-+*/(),]))"
 )
 REFERENCE: Final = r"(?ai)&\s*([a-z_]\w*)"  # Reference to a parameter, such as &tend.
-# Largest depth of nested parentheses, which keeps the recursion from exhausting Python's stack.
+# Largest depth of nested parentheses, which prevents the recursion from exhausting Python's stack.
 _DEEPEST = 50
 LONGEST = 40  # Largest number of characters in a number.
 _LONGEST_EXPRESSION = 2000
@@ -34,7 +34,7 @@ _CONSTANTS: Final = {"pi": math.pi, "dtor": math.pi / 180, "rtod": 180 / math.pi
 
 
 class ExpressionError(Exception):
-    """Raised inside the deck reader for a string that is not a number; the message states why."""
+    """Raised inside the deck reader for a string that is not a number; the message gives the reason."""
 
 
 @lru_cache(4096)  # Results are cached, because most fields are blank or 0.
@@ -68,7 +68,7 @@ def is_deck_number(text: str) -> bool:
 
 @lru_cache(4096)
 def convert_plain(kind: Callable[[float], Any], text: str) -> tuple[Any, str] | None:
-    """Return the number in a string that is a plain number of this type; None if the string has to be evaluated."""
+    """Return the number in a string that is a plain number of this type; None if the string must be evaluated."""
     return (
         None
         if "&" in text or text[0] == "<"
@@ -140,7 +140,7 @@ def evaluate(text: str, lookup: Callable[[str], Number]) -> Number:
 
 
 def _round_half_away(x: Number) -> int:
-    """Round to the nearest integer, and halves away from zero."""
+    """Round to the nearest integer, with halves away from zero."""
     return int(math.copysign(math.floor(abs(x) + 0.5), x))
 
 
@@ -196,7 +196,7 @@ def _raise_to_power(x: Number, y: Number) -> Number:
     return int(result) if isinstance(x, int) and isinstance(y, int) else result
 
 
-# Precedence of each operator, and the function that implements it.
+# Precedence of each operator, and the function that implements the operator.
 _OPERATIONS: Final[dict[str, tuple[int, Callable[[Number, Number], Number]]]] = {
     "+": (1, operator.add),
     "-": (1, operator.sub),

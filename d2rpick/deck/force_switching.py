@@ -1,4 +1,4 @@
-"""Evaluate force-controlled switches (LS-DYNA's CODE 1 to 4) for known contact times.
+"""Evaluate switches by a force (LS-DYNA's CODE 1 to 4) for known contact times.
 
 Source: the vendor's keyword data as published in its Python library. A set switches between TIME1 and TIME2 when the
 force of its contact or wall is zero (CODE 1, 2) or not zero (CODE 3, 4). The sets of a pair act in turn, beginning with
@@ -111,7 +111,7 @@ def _find_next_switch(with_force: bool, since: float, contacts: Spans) -> float:
 def find_delay_without_chatter(
     windows: Sequence[tuple[float, float]], contacts: Spans
 ) -> float | None:
-    """Return the smallest TIME3 of the releasing set at which the pair switches in these windows only.
+    """Return the smallest TIME3 of the releasing set with which the pair switches only in these windows.
 
     Each contact before a window must be over within this time; None if no contact precedes any window.
     """

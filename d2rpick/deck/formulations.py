@@ -23,7 +23,7 @@ _ISH3N: Final = {
     **dict.fromkeys((0, 1, 2), Formulation("C0 triangle", BT, measured=False)),
     30: Formulation("DKT18", QBAT, measured=False), 31: Formulation("DKT_S3", QEPH, measured=False),
 }  # fmt: skip
-# Names of Radioss solids, keyed by Isolid. They share one class, because the measured costs of 24, 17 and 1 are equal.
+# Names of Radioss solids by Isolid. They share one class, because the measured costs of 24, 17 and 1 are equal.
 _ISOLID: Final = {
     5: "HEPH5",
     14: "HA8",
@@ -32,7 +32,7 @@ _ISOLID: Final = {
 }
 _ISOLID_MEASURED: Final = {1, 17, 24}
 
-# Formulation name and class of LS-DYNA shells, keyed by ELFORM; the class follows from the integration points.
+# Formulation name and class of LS-DYNA shells by ELFORM; the class follows from the integration points.
 _ELFORM_SHELL: Final = {
     1: ("Hughes-Liu", BT), 2: ("Belytschko-Tsay", BT), 3: ("BCIZ triangle", BT), 4: ("C0 triangle", BT),
     5: ("membrane", BT), 6: ("S/R Hughes-Liu", QBAT), 7: ("S/R co-rotational Hughes-Liu", QBAT),

@@ -1,4 +1,4 @@
-"""Compute element sizes, and from them the mass, the smallest stable time step and the position of each part.
+"""Compute element sizes and, from them, the mass, the smallest stable time step and the position of each part.
 
 The time step is the time in which a wave crosses an element, before any factor of the solver: L/c with c^2 = E/rho for
 beams, E/(rho (1 - nu^2)) for shells and E (1 - nu)/(rho (1 + nu)(1 - 2 nu)) for solids. L is the length of a beam, the
@@ -26,9 +26,9 @@ if TYPE_CHECKING:
 
     from d2rpick.deck.model import Inventory, Material, PartData, Places, Reals
 
-# Number of elements that are processed at a time; their arrays fit into the processor cache.
+# Number of elements that are processed at a time, so that their arrays fit into the processor cache.
 _PIECE: Final = 1 << 14
-# Nodes of each face of a brick, in order when seen from outside.
+# Nodes of each face of a brick, in order as seen from outside.
 _FACES: Final = (
     (0, 3, 2, 1),
     (4, 5, 6, 7),
@@ -208,7 +208,7 @@ def _measure_tetrahedra(nodes: Places, coordinates: Reals) -> tuple[Reals, Reals
 
 
 def _measure_bricks(nodes: Places, coordinates: Reals) -> tuple[Reals, Reals]:
-    """Return the volumes of solids, and the shortest wave paths; the nodes of a brick may repeat or be missing."""
+    """Return the volumes of solids, and the shortest wave paths; the nodes of a brick may be repeated or missing."""
     eight = nodes[:, :8].copy()
     for column in range(1, 8):
         eight[:, column] = np.where(
@@ -223,7 +223,7 @@ def _measure_bricks(nodes: Places, coordinates: Reals) -> tuple[Reals, Reals]:
 
 
 def _compute_volume_below(corners: Reals, face: tuple[int, int, int, int]) -> Reals:
-    """Return the signed volumes between the first corner and a face; their sum over all faces is the volume."""
+    """Return the signed volumes between the first corner and a face, whose sum over all faces is the volume."""
     a, b, c, d = face
     return _compute_tetrahedron_volumes(
         corners, (0, a, b, c)
@@ -334,7 +334,7 @@ class Placement:
 def _compute_shares(
     elements: Elements, coordinates: Reals
 ) -> Iterable[tuple[int, _PartShare]]:
-    """Return what the elements of one kind contribute to the position of each part."""
+    """Return the contribution of the elements of one kind to the position of each part."""
     if elements.nodes.shape[1] == 0:
         return []
     if elements.kind in DISCRETE:
@@ -349,7 +349,7 @@ def _compute_shares(
     first = np.stack(
         [np.bincount(part_index, sizes * axis) for axis in middles.T], axis=1
     )
-    # Coordinates are taken relative to the part centre, because far from the origin rounding would lose digits.
+    # Coordinates are taken relative to the part centre, because rounding far from the origin would lose digits.
     x, y, z = (middles - (first / total[:, np.newaxis])[part_index]).T
     xx, yy, zz, xy, yz, zx = (
         np.bincount(part_index, sizes * a * b)

@@ -50,7 +50,8 @@ NODAL_BODY: Final = DataLine(integers("PID CID NSID"))
 EXTRA_NODES: Final = DataLine(integers("PID NID"))
 JOINT: Final = DataLine(integers("N1 N2 N3 N4 N5 N6"))
 NODE_PAIR: Final = DataLine(integers("N1 N2"))
-GENERALIZED_WELD: Final = DataLine(integers("NSID"))
+NODE_SET: Final = DataLine(integers("NSID"))
+MERGED_BODIES: Final = DataLine(integers("PIDL PIDC"))
 GLOBAL_CONSTRAINT: Final = DataLine(integers("TC RC DIR"), reals("X Y Z"))
 
 # Lines of *BOUNDARY_SPC with the option BIRTH_DEATH, and of *BOUNDARY_PRESCRIBED_MOTION.

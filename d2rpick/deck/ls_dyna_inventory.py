@@ -50,7 +50,7 @@ _OPTIONS: Final = OPTIONS_WITHOUT_IDS | {
     *("SHL4", "TO", "SHL8", "TET4TOTET10"),
     *("H8TOH20", "H8TOH27", "H8TOH64", "H20", "H27", "H64", "P21", "P40", "T15", "T20"),
 }
-# Keywords that define no elements and do not change the mass or the cost of a part.
+# Keywords that define no elements and change neither the mass nor the cost of a part.
 _NO_ELEMENTS: Final = {"MASS", "INERTIA", "BLANKING", "LANCING", "TRIM", "PLOTEL"}
 _TEN: Final = 10  # Number of nodes on the second line of a solid element.
 _SPRING: Final = re.compile(r"MAT_(SPRING|DAMPER|S\d\d)(_|\Z)")
@@ -224,7 +224,7 @@ def find_shared_nodes(
 
 
 def find_first_parts(cards: Sequence[Card], parts: Collection[int]) -> dict[int, int]:
-    """Return the first of ``parts`` to which each node belongs, keyed by node id."""
+    """Return the first of ``parts`` to which each node belongs, by node id."""
     part_by_node: dict[int, int] = {}
     for part, node in _list_nodes(cards, parts):
         part_by_node.setdefault(node, part)
@@ -234,7 +234,7 @@ def find_first_parts(cards: Sequence[Card], parts: Collection[int]) -> dict[int,
 def find_parts_of_nodes(
     cards: Sequence[Card], nodes: Collection[int]
 ) -> dict[int, set[int]]:
-    """Return the parts whose elements contain each of the given nodes, keyed by node id."""
+    """Return the parts whose elements contain each of the given nodes, by node id."""
     parts_by_node: dict[int, set[int]] = {}
     wanted = {*nodes}
     for card in cards:

@@ -55,7 +55,7 @@ if TYPE_CHECKING:
     from d2rpick.deck.reader import Deck
 
 _PART_ID, _NODE_SET = 3, 4  # Values of SSTYP and MSTYP for a part and a node set.
-# Beginnings of other keywords that connect parts; d2rpick does not read which parts they connect.
+# Beginnings of other keywords that connect parts; d2rpick does not read which parts these keywords connect.
 _OTHER_TIES: Final = (
     *(
         "CONSTRAINED_TIED_NODES_FAILURE",
@@ -87,7 +87,7 @@ _SYMMETRY: Final = "BOUNDARY_SPC_SYMMETRY_PLANE"
 # Values of DOF with which a prescribed motion has a second line.
 _OWN_CENTRE: Final = (9, 10, 11)
 _RELATIVE: Final = 4  # Value of VAD with which a prescribed motion has a second line.
-# Nodes up to this distance from a *CONSTRAINED_GLOBAL plane are on it, as a fraction of the model size [-].
+# Nodes are on a *CONSTRAINED_GLOBAL plane up to this distance, as a fraction of the model size [-].
 _FLAT: Final = 1e-4
 
 
@@ -148,7 +148,10 @@ def _read_supports(deck: Deck) -> Iterator[Hold | str]:
 
 
 def _read_support(deck: Deck, card: Card, row: Row, times: Row | None) -> Hold | str:
-    """Read a line of *BOUNDARY_SPC for a node or a node set. A constraint in local axes always counts as a support."""
+    """Read a line of *BOUNDARY_SPC for a node or node set.
+
+    A constraint in local axes is always treated as a support.
+    """
     nodes = _find_nodes(deck, card, row)
     _, system, *flags = card.numbers(row, SPC)
     fixed = [bool(flag.value) for flag in flags]
@@ -175,7 +178,7 @@ def _set_times(hold: Hold, card: Card, row: Row, line: DataLine) -> Hold:
 
 
 def _find_nodes(deck: Deck, card: Card, row: Row) -> Places | None:
-    """Return the node, or the nodes of the node set (``_SET``), given at the beginning of a line.
+    """Return the node, or the nodes of the node set (``_SET``), at the beginning of a line.
 
     None if they are unknown.
     """
@@ -194,7 +197,7 @@ def _read_node_supports(numbers: Places, codes: Places) -> Iterator[Hold]:
 
 
 def _read_plane_support(card: Card, numbers: Places, coordinates: Reals) -> Hold | str:
-    """Return the support of the nodes on the plane that a *CONSTRAINED_GLOBAL fixes."""
+    """Return the support of those nodes that lie on the plane that a *CONSTRAINED_GLOBAL fixes."""
     rows = card.lines
     if rows:
         code, normal = (

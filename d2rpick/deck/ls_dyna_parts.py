@@ -14,11 +14,12 @@ from d2rpick.base.tuples import NamedTuple
 from d2rpick.deck.ls_dyna_columns import (
     ENTITY,
     EXTRA_NODES,
-    GENERALIZED_WELD,
     JOINT,
     MATERIAL,
+    MERGED_BODIES,
     NODAL_BODY,
     NODE_PAIR,
+    NODE_SET,
     PART,
     PART_INERTIA,
     SECTION,
@@ -51,7 +52,11 @@ _SET_OPTIONS: Final = {"LIST", "TITLE", "COLLECT", "GENERATE", "COLUMN", "ADD"}
 _NODE_SET_OPTIONS: Final = {"LIST", "TITLE", "GENERATE", "COLUMN"}
 # Node sets of each deck that have been read.
 _NODE_SETS: WeakKeyDictionary[Deck, Mapping[int, frozenset[int]]] = WeakKeyDictionary()
-# Solid formulations that keep their stresses in global axes, keyed by ELFORM; 0 and 9 are co-rotational.
+# Nodes of the nodal rigid body to which each node belongs, by deck.
+_NODAL_BODIES: WeakKeyDictionary[Deck, Mapping[int, frozenset[int]]] = (
+    WeakKeyDictionary()
+)
+# Solid formulations, by ELFORM, that keep their stresses in global axes; 0 and 9 are co-rotational.
 NOT_TURNED: Final = {
     -2: "8 points, selectively reduced, for poor aspect ratios",
     -1: "8 points, selectively reduced, for poor aspect ratios",
@@ -105,7 +110,7 @@ _ABLE: Final = (
     "NODES_TO_SURFACE",
     "NODE_TO_SURFACE",
 )
-# Largest number of lines of one contact or wall without an id; more lines may define a second one.
+# A contact or wall without an id has at most this number of lines; more lines may define a second one.
 _MOST_ROWS: Final = 8
 
 
@@ -132,7 +137,7 @@ class DeckPartSet(NamedTuple):
 
 @dataclass(eq=False, repr=False)
 class DeckParts:
-    """Data of each part, and part sets, keyed by id; None stands for a kind of set that cannot be read.
+    """Data of each part, and part sets, by id; None stands for a kind of set that cannot be read.
 
     ``all_known`` is False if an include was not read, a block is encrypted, or a keyword creates parts in a way that
     cannot be read: a part that is missing here may then exist. ``problems`` are unreadable ids of parts and sets, and
@@ -210,7 +215,7 @@ def find_rigid_materials(deck: Deck) -> Iterator[Card]:
 
 
 def name_material(card: Card, row: Row, column: CardColumn) -> str:
-    """Return the id of a material, with its offset, as text, or the name of the material if the deck uses names."""
+    """Return the id of a material (with its offset) as text, or the name of the material if the deck uses names."""
     value = card.integer(row, column)
     if value.problem:
         return value.field.text.upper()
@@ -225,7 +230,7 @@ def _add_parts(card: Card, parts: DeckParts) -> None:
     if "ATTACHMENT" in options:
         # The option ATTACHMENT adds one line, like the option PRINT.
         options = (options - {"ATTACHMENT", "NODES"}) | {"PRINT"}
-    # A composite is one part with a material per ply; none of these materials makes the part rigid.
+    # A composite is one part with a material per ply, none of which makes the part rigid.
     if "COMPOSITE" in options:
         if len(card.rows) > 1:
             _add_part(card, card.rows[:2], "", parts)
@@ -404,7 +409,7 @@ def _read_card_sections(card: Card) -> Iterator[tuple[int, SectionCard]]:
 
 
 def find_element_cards(deck: Deck, *, searched: bool) -> list[Card]:
-    """Return the element cards that may define shared nodes, or the other element cards if ``searched`` is False."""
+    """Return the element cards that may define shared nodes or, if ``searched`` is False, the other element cards."""
     cards = deck.named(*_SEARCHED)
     return [
         card
@@ -414,12 +419,21 @@ def find_element_cards(deck: Deck, *, searched: bool) -> list[Card]:
 
 
 Kind = Literal[
-    "nodal rigid body", "extra nodes", "joint", "spotweld", "rivet", "generalized weld"
+    "nodal rigid body",
+    "extra nodes",
+    "joint",
+    "spotweld",
+    "rivet",
+    "generalized weld",
+    "constrained node set",
 ]
 
 
 class Constraint(NamedTuple):
-    """A constraint: its kind, field, id (0 if it has none), nodes, and the rigid part to which it belongs."""
+    """A constraint: its kind, field, id (0 if it has none), nodes, and the rigid part to which it belongs.
+
+    The nodes of a joint include all nodes of the nodal rigid bodies that it connects.
+    """
 
     kind: Kind
     place: CardField
@@ -442,7 +456,7 @@ def _read_nodal_rigid_bodies(
     """Yield the nodal rigid bodies on a card."""
     options = card.options(_BODY)
     rows = card.lines
-    # Other options add lines, so a keyword with them defines only one body.
+    # Other options add lines, so a keyword with such options defines only one body.
     if options - {"TITLE"}:
         rows = rows[:2] if "TITLE" in options else rows[:1]
     for row in rows[1::2] if "TITLE" in options else rows:
@@ -467,7 +481,7 @@ def _read_extra_nodes(deck: Deck, card: Card, kind: Kind) -> Iterator[Constraint
         yield Constraint(kind, part.field, 0, nodes, part.value + card.transform.part)
 
 
-def _read_joint(_: Deck, card: Card, kind: Kind) -> Iterator[Constraint]:
+def _read_joint(deck: Deck, card: Card, kind: Kind) -> Iterator[Constraint]:
     """Yield the joint on a card."""
     if card.name.startswith(
         (
@@ -482,7 +496,21 @@ def _read_joint(_: Deck, card: Card, kind: Kind) -> Iterator[Constraint]:
             number = card.integer(card.lines[0], ENTITY["ID"]).value
         else:
             number = 0
-        yield _read_node_list(card, row, kind, JOINT, number)
+        joint = _read_node_list(card, row, kind, JOINT, number)
+        bodies = _map_nodal_bodies(deck)
+        further = (bodies.get(node, frozenset()) for node in joint.nodes)
+        yield joint._replace(nodes=joint.nodes.union(*further))
+
+
+def _map_nodal_bodies(deck: Deck) -> Mapping[int, frozenset[int]]:
+    """Return the nodes of the nodal rigid body to which each node belongs, keyed by node id."""
+    if deck not in _NODAL_BODIES:
+        _NODAL_BODIES[deck] = {
+            node: body.nodes
+            for body in read_constraints(deck, "nodal rigid body")
+            for node in body.nodes
+        }
+    return _NODAL_BODIES[deck]
 
 
 def _read_node_pairs(_: Deck, card: Card, kind: Kind) -> Iterator[Constraint]:
@@ -491,10 +519,10 @@ def _read_node_pairs(_: Deck, card: Card, kind: Kind) -> Iterator[Constraint]:
     return (_read_node_list(card, row, kind, NODE_PAIR) for row in rows)
 
 
-def _read_generalized_weld(deck: Deck, card: Card, kind: Kind) -> Iterator[Constraint]:
-    """Yield the generalized weld on a card."""
+def _read_constrained_set(deck: Deck, card: Card, kind: Kind) -> Iterator[Constraint]:
+    """Yield the constraint of a node set on a card."""
     for row in _get_first_line(card):
-        members = card.integer(row, GENERALIZED_WELD["NSID"])
+        members = card.integer(row, NODE_SET["NSID"])
         yield Constraint(
             kind,
             members.field,
@@ -528,8 +556,39 @@ _CONSTRAINTS: Final[
     "joint": ("CONSTRAINED_JOINT", _read_joint),
     "spotweld": ("CONSTRAINED_SPOTWELD", _read_node_pairs),
     "rivet": ("CONSTRAINED_RIVET", _read_node_pairs),
-    "generalized weld": ("CONSTRAINED_GENERALIZED_WELD", _read_generalized_weld),
+    "generalized weld": ("CONSTRAINED_GENERALIZED_WELD", _read_constrained_set),
+    "constrained node set": ("CONSTRAINED_NODE_SET", _read_constrained_set),
 }
+
+
+# Flags of a switching card that delete each kind of constraint (vendor keyword data).
+# No source states which flag deletes extra nodes and joints, so both are listed.
+DELETING_FLAGS: Final[Mapping[Kind, tuple[str, ...]]] = {
+    "nodal rigid body": ("NRBF",),
+    "generalized weld": ("NRBF",),
+    "spotweld": ("NCSF",),
+    "rivet": ("NCSF",),
+    "constrained node set": ("NCSF",),
+    "extra nodes": ("NRBF", "NCSF"),
+    "joint": ("NRBF", "NCSF"),
+}
+
+
+def read_merged_bodies(deck: Deck) -> Iterator[tuple[CardField, frozenset[int]]]:
+    """Yield the place and the two parts of each pair that *CONSTRAINED_RIGID_BODIES merges into one rigid body.
+
+    With the option SET, the second number is a part set, and only the first part is returned.
+    """
+    for card in deck.named("CONSTRAINED_RIGID_BODIES"):
+        has_set = "SET" in card.options("CONSTRAINED_RIGID_BODIES")
+        for row in card.data:
+            values = card.numbers(row, MERGED_BODIES)[: 1 if has_set else 2]
+            ids = (
+                value.value + card.transform.part
+                for value in values
+                if not value.problem and value.value > 0
+            )
+            yield values[0].field, frozenset(ids)
 
 
 class Entity(NamedTuple):
@@ -553,7 +612,7 @@ class Entities(NamedTuple):
     all_known: bool
 
     def named(self, number: int) -> Entity | None:
-        """Return the contact or wall with this id; if there is none, the one with this number in order of definition.
+        """Return the contact or wall with this id or, failing that, with this number in the order of definition.
 
         An entry with an id is never found by its number.
         """

@@ -39,7 +39,7 @@ _ALWAYS: Final = ((0.0, math.inf),)
 
 
 class Control(NamedTuple):
-    """A *SENSOR_CONTROL for a switch set, with the ids of its *SENSOR_SWITCH cards in the order in which they are used.
+    """A *SENSOR_CONTROL for a switch set, with the ids of its *SENSOR_SWITCH cards in the order of their use.
 
     ``initial`` is its state at the start, ON or OFF. ``rounds`` is how often all switches act in turn; it may be
     infinite.
@@ -127,7 +127,7 @@ def follow_control(
 
 
 def _find_first_time(spans: Spans, since: float) -> float:
-    """Return the first time at or after ``since`` at which a condition is met; infinity if it is never met."""
+    """Return the first time at or after ``since`` at which a condition is met; infinity if it never is."""
     return next((max(since, start) for start, end in spans if since < end), math.inf)
 
 
@@ -171,7 +171,7 @@ def _find_spans_of_switch(
 def _find_spans_of_sensor(
     deck: Deck, number: int, value: float, forces: Forces | None, *, above: bool
 ) -> Spans | str:
-    """Return the spans in which the force on a sensor is above or below a value, or why the spans are unknown."""
+    """Return the spans in which the force on a sensor is above or below a value, or why these spans are unknown."""
     card, row = _find_row(
         deck.named("SENSOR_DEFINE"), SENSOR_FORCE["SENSID"], number
     ) or (None, None)

@@ -36,7 +36,7 @@ _WIDEST: Final = 240  # Longest line of a mesh [characters].
 _BLANK, _ZERO = (np.uint8(ord(letter)) for letter in " 0")
 # Characters that occur only in lines without fixed columns, which are parsed separately.
 _ONE_BY_ONE: Final = (b",", b"&", b"<", b"\t")
-# Index of the last character of most ids; a line that has a character at this index is not blank.
+# Index of the last character of most ids; a line with a character at this index is not blank.
 _ID_ENDS: Final = 7
 _HIGHEST: Final = 10**17  # Ids must be smaller than this number to avoid an overflow.
 NO_NODE: Final = -1  # Index that stands for a missing node.
@@ -206,7 +206,7 @@ def _make_id(value: float) -> int:
 
 
 def find_distinct(values: Places) -> Places:
-    """Return the distinct values in ascending order; sorting is faster than hashing here."""
+    """Return the distinct values in ascending order by sorting, which is faster than hashing here."""
     ordered = np.sort(values, axis=None)
     if ordered.size:
         is_first: NDArray[np.bool_] = np.append(True, ordered[1:] != ordered[:-1])

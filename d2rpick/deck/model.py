@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     Places = NDArray[np.int64]
     Reals = NDArray[np.float64]
 
-# Number of integration points through the thickness that is assumed for a shell; most shells have 2 to 5.
+# Assumed number of integration points through the thickness of a shell; most shells have 2 to 5.
 _LAYERS: Final = 3
 SPRING: Final = "spring"
 # Element kinds that stay deformable when their part is made rigid.
@@ -126,7 +126,7 @@ Acting = TypeVar("Acting", Hold, Gravity, Joint)
 
 
 def place_nodes(acting: Iterable[Acting], table: NodeTable) -> tuple[Acting, ...]:
-    """Replace node ids by indices in the table; drop nodes that are not in the table."""
+    """Replace node ids by indices in the table; drop nodes that the table lacks."""
     # The nodes of a joint are never None, which mypy cannot infer for this type.
     return tuple(
         load if load.nodes is None else load._replace(nodes=table.known(load.nodes))  # type: ignore[redundant-expr]
@@ -359,7 +359,7 @@ class Inventory:
 
     @cached_property
     def sprung(self) -> Mapping[int, Mapping[int, frozenset[str]]]:
-        """Return the parts that springs connect to each part and let move relative to it, keyed by part id."""
+        """Return the parts that springs connect to each part (so that they can move relative to it), by part id."""
         ends = (elements.nodes for elements in self.elements if elements.kind == SPRING)
         return self._held_by(
             [
@@ -408,7 +408,7 @@ class Inventory:
         return tuple(whole_parts)
 
     def bodies(self, parts: Collection[int]) -> tuple[tuple[int, ...], ...]:
-        """Return the rigid bodies formed by these parts; parts connected by nodes, joints or springs form one body.
+        """Return the rigid bodies that these parts form; parts connected by nodes, joints or springs form one body.
 
         A car with its engine on mounts is one body. Engine, battery and wheels alone are several, like loose wheels. If
         all parts of a rigid body of the deck (attribute `switched`) are among these parts, they form one body. Springs
@@ -477,7 +477,7 @@ class Inventory:
 
     def _inside(self, parts: Collection[int]) -> Mapping[int, Counter[str]]:
         """Return the number of elements whose nodes all belong to these parts, per part id and kind."""
-        # The index NO_NODE is -1, and therefore selects this last entry.
+        # The index NO_NODE is -1 and therefore selects this last entry.
         inside = np.append(self._mask(parts), True)
         counts_by_part: dict[int, Counter[str]] = {}
         for elements in self.elements:

@@ -21,7 +21,7 @@ _MOST_LISTED: Final = 10
 def number_sets(
     groups: Iterable[Sequence[int]], first: int
 ) -> dict[tuple[int, ...], int]:
-    """Return part set ids for all groups of parts that are too large to list, keyed by the sorted tuple of part ids."""
+    """Return part set ids for all groups of parts that are too large to list, by the sorted tuple of part ids."""
     long_groups = dict.fromkeys(
         tuple(sorted(group)) for group in groups if len(group) > _MOST_LISTED
     )

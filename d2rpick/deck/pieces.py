@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     Mask = NDArray[np.bool_]
 
-# Numbers of the connected pieces by node; they are cached, because a mesh may have millions of nodes.
+# Numbers of the connected pieces by node, which are cached because a mesh may have millions of nodes.
 _LABELS: WeakKeyDictionary[Inventory, dict[tuple[frozenset[int], bool], Places]] = (
     WeakKeyDictionary()
 )
@@ -43,9 +43,9 @@ _UNTURNED: Final = {
     "thick shell",
     "particle",
 }
-# Nodes up to this distance from a plane are on it, as a fraction of the size of the connected piece [-].
+# Nodes are on a plane up to this distance, as a fraction of the size of the connected piece [-].
 _FLAT: Final = 1e-6
-# Smallest mass of a piece that moves other pieces on springs, as a fraction of the total mass of these pieces [-].
+# A piece moves other pieces on springs if its mass is at least this fraction of their total mass [-].
 _HEAVY: Final = 0.05
 
 
@@ -118,7 +118,7 @@ def _list_connections(
 def find_supports(
     inventory: Inventory,
 ) -> tuple[Mapping[int, tuple[Hold, ...]], tuple[Hold, ...]]:
-    """Return the supports of each supported part, keyed by part id, and the supports of the model.
+    """Return the supports of each supported part by part id, and the supports of the model.
 
     A completely fixed piece is an obstacle: it is supported itself, but does not support a piece that it is not
     connected to.
@@ -242,8 +242,8 @@ def _is_plane(heights: NDArray[np.float64], fixed: Mask, tolerance: float) -> bo
 # The reduced mass of a piece of mass m on springs to pieces of total mass M is mu = m M/(m + M).
 # A spring of stiffness k along the unit vector l adds k l l^T to the stiffness matrix K of the piece.
 # The period of a piece along an eigenvector of K with eigenvalue lambda is 2 pi (mu/lambda)^(1/2).
-# A load is transmitted first in the stiffest direction, so the largest eigenvalue of K determines the period.
-# Replacing the eigenvalue by the trace of K in the formula for the period gives a lower bound on all periods.
+# A load is transmitted in the stiffest direction first, so the largest eigenvalue of K determines the period.
+# If the trace of K replaces the eigenvalue in the formula for the period, the result is a lower bound on all periods.
 
 
 class InnerPeriod(NamedTuple):

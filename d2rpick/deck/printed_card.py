@@ -18,7 +18,7 @@ Times = tuple[float, float]
 """A rigid window (tr, td) [time of the model]."""
 
 WIDTH = 10  # Width of a field [characters].
-# Largest number of characters of a number; a space separates the number from the next field.
+# Largest number of characters of a number; a space separates it from the next field.
 LONGEST = WIDTH - 1
 _POINT = re.compile(r"\d\.\d")
 _MOST_DIGITS = 17
@@ -70,7 +70,8 @@ class Printing(NamedTuple):
     speed : float, optional
         Speed at which the parts approach the contact [length/time].
     delete_nodal_bodies, delete_node_sets : bool
-        LS-DYNA: delete nodal rigid bodies (NRBF), or joints and extra nodes (NCSF), while the parts are rigid.
+        LS-DYNA: delete nodal rigid bodies and generalized welds (NRBF), or other constraints (NCSF), while the parts
+        are rigid.
     replaced : tuple of int
         Main nodes of the bodies that new bodies replace.
     """

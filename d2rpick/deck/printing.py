@@ -1,4 +1,4 @@
-"""Print rigid windows as solver input, with one function per solver and a table of the solvers.
+"""Print rigid windows as solver input: one function per solver, and a table of the solvers.
 
 LS-DYNA: a pair of *DEFORMABLE_TO_RIGID_AUTOMATIC cards for each window. Radioss: engine files that end at the switching
 times, with /RBODY/ON and /RBODY/OFF, or time sensors that switch within one engine run.
@@ -50,7 +50,7 @@ if TYPE_CHECKING:
 
 _FILE: Final = "switches.k"
 
-# CODE values that wait until a force ends and until a force acts, keyed by kind of contact.
+# CODE values that wait until a force ends and until a force acts, by kind of contact.
 _CODES: Final = {"INTER": (2, 4), "RWALL": (1, 3)}
 _OF_OFFSET: Final = "OFFSET was not tested with the solver: it should exceed the thickness of the contact."
 _LEFT_ACTIVE = (
@@ -58,9 +58,14 @@ _LEFT_ACTIVE = (
     "  (NRBF, NCSF, RWF 0). If there are any, set 1 (delete) on the first card and",
     "  2 (activate again) on the second.",
 )
-_DELETED = (
-    "Nodal rigid bodies, joints and extra nodes of the deck, which all lie on these",
-    "  parts, are deleted (NRBF, NCSF 1) while these are rigid, and activated again (2).",
+_NODAL_BODIES_DELETED = (
+    "Nodal rigid bodies and generalized welds of the deck, which all lie on these",
+    "  parts, are deleted (NRBF 1) while these are rigid, and activated again (2).",
+)
+_NODE_SETS_DELETED = (
+    "Joints, extra nodes, spotwelds and other nodal constraints of the deck, which",
+    "  all lie on these parts, are deleted (NCSF 1) while these are rigid, and",
+    "  activated again (2).",
 )
 _SEPARATE = (
     "CHECK BEFORE USE: each part becomes a rigid body of its own (LRB 0). This is",
@@ -109,7 +114,7 @@ def _print_ls_dyna(
     ids = check_ids(printing.part)
     sets = list(_number_switch_sets(printing.swset, len(windows)))
     if printing.merge is not None:
-        # The lead id follows another id on the same line, with a space in between.
+        # The lead id follows another id on the same line, after a space.
         check_ids([printing.merge], LONGEST)
     texts = [(write_number(tr), write_number(td)) for tr, td in windows]
     _check_printed([text for pair in texts for text in pair])
@@ -234,10 +239,13 @@ def _note_roundings(times: Times, texts: tuple[str, str]) -> Iterator[str]:
 
 def _write_warnings(ids: Sequence[int], printing: Printing) -> Iterator[str]:
     """Yield the comment lines of an LS-DYNA card."""
-    deleted = printing.delete_nodal_bodies or printing.delete_node_sets
+    deleted = (
+        *(_NODAL_BODIES_DELETED if printing.delete_nodal_bodies else ()),
+        *(_NODE_SETS_DELETED if printing.delete_node_sets else ()),
+    )
     yield from (
         *PHYSICS,
-        *(_DELETED if deleted else _LEFT_ACTIVE),
+        *(deleted or _LEFT_ACTIVE),
         "Springs and dampers are not switched.",
         *write_comments([_explain_step_limit(printing)]),
     )
@@ -386,7 +394,7 @@ def _print_sensors(
         f"The largest step, {cap:.4g}, holds for the whole run, which takes {fewest_cycles} cycles at least;"
         " if it takes fewer without switching, set --step-cap to at least the deformable time step."
     )
-    # The note is written to the file as well, because the file may be used without the card.
+    # The note is also written to the file, because the file may be used without the card.
     comments = [f"# {line}" for line in write_comments([step_warning])]
     lines = (
         f"/RUN/{printing.name}/1",

@@ -52,7 +52,7 @@ if TYPE_CHECKING:
 
 # Value of Ikrem with which the starter keeps the nodes of a body in rigid walls.
 _STAYS: Final = 1
-# Column of the node group in the first line below the title, keyed by keyword of the initial velocity.
+# Column of the node group in the first line below the title, by keyword of the initial velocity.
 _GROUP_OF_VELOCITY: Final = dict.fromkeys(
     ("TRA", "ROT", "T+G", "GRID"), VELOCITY["grnod_ID"]
 ) | {"AXIS": AXIS_GROUP["grnod_ID"]}
@@ -60,7 +60,7 @@ _GROUP_OF_GRAVITY: Final = GRAVITY["grnod_ID"]
 
 
 class SwitchedBodies(NamedTuple):
-    """The rigid bodies that switch the given parts, and the cards of the bodies among them that are new.
+    """The rigid bodies that switch the given parts, and the cards of those bodies that are new.
 
     ``nodes`` are all their main nodes. ``cards`` are the cards that the starter deck lacks, to be inserted before its
     /END; empty if it lacks none. ``notes`` describe these cards. ``sensor`` and all ids above it are free for sensors.
@@ -169,7 +169,7 @@ def _describe_pieces(inventory: Inventory, parts: Sequence[int]) -> str:
 
 
 def _select_stiff_parts(inventory: Inventory, parts: Collection[int]) -> list[int]:
-    """Return the parts that have elements other than springs; if no part has such elements, return all parts."""
+    """Return the parts that have elements other than springs; if there are none, return all parts."""
     return [
         part for part in parts if not set(inventory.counts.get(part, ())) <= DISCRETE
     ] or list(parts)
@@ -322,7 +322,7 @@ class _BodyWriter:
         return node, "\n".join(lines) + f"\n{moving}"
 
     def next(self, kind: str) -> int:
-        """Return an unused id above all ids of one kind of card."""
+        """Return an unused id above all ids of cards of one kind."""
         if kind not in self._free:
             words = (split_keyword(block) for block in self._starter.blocks)
             ids = (
@@ -377,7 +377,7 @@ class _BodyWriter:
                 yield self._again(card, _GROUP_OF_GRAVITY, alone)
 
     def _reached(self, card: Card, column: CardColumn | None) -> frozenset[int]:
-        """Return the nodes of the group whose id is in a column of a card, or the nodes that the card lists itself.
+        """Return the nodes of the group whose id is in a column of a card, or the nodes that the card itself lists.
 
         Empty if a card has no group.
         """

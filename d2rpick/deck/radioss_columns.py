@@ -43,7 +43,7 @@ WALL: Final = DataLine(integers("node_ID Slide grnd_ID1 grnd_ID2 Iform"))
 WALL_SIZES: Final = DataLine(reals("d fric Diameter", _REAL))
 POINT: Final = DataLine(reals("X Y Z", _REAL))
 
-# Lines of /INIVEL with a node group; with AXIS, the group has a separate line above the velocities.
+# Lines of /INIVEL with a node group; with AXIS, the group has its own line above the velocities.
 VELOCITY: Final = DataLine(reals("Vx Vy Vz", _REAL), integers("grnod_ID"))
 AXIS_GROUP: Final = DataLine(integers("Dir frame_ID grnod_ID"))
 AXIS_VELOCITY: Final = DataLine(reals("Vx Vy Vz Vr", _REAL))
@@ -60,7 +60,7 @@ GRAVITY: Final = DataLine(
 MOTION_TIMES: Final = DataLine(reals("Ascale_x Fscale_y Tstart Tstop", _REAL))
 FREE_MOTION: Final = DataLine(integers("fct_ID part_ID"))
 
-# Line of /BCS: three digits for the translations and three for the rotations, followed by the skew.
+# Line of /BCS: three digits for the translations, three for the rotations, and the skew.
 SUPPORT: Final = DataLine(
     blank(3),
     words("Tra", 3),

@@ -52,7 +52,7 @@ WITHOUT_FRAME: Final = {
 }
 _RIGID_PARTS_SINCE: Final = 2612  # First input version with Irigid in /PART.
 _ICOROTATIONAL: Final = 2  # Value of Iframe that selects a co-rotational frame.
-# Values of Isolid that select bricks without a co-rotational frame (including 12, by the help up to 2017).
+# Values of Isolid for bricks without a co-rotational frame (including 12, according to the help up to 2017).
 _NOT_TURNED: Final = {
     1,
     2,
@@ -131,7 +131,7 @@ def get_number(card: Card, at: int = 1) -> int:
 
 
 def get_lines_below_title(card: Card) -> tuple[Row, ...]:
-    """Return the non-blank lines below the title; the title itself may be blank."""
+    """Return the non-blank lines below the title, which may be blank itself."""
     return tuple(row for row in card.rows[1:] if not row.blank)
 
 
@@ -204,7 +204,7 @@ def _begin_leg(card: Card) -> RadiossLeg:
 
 
 def _add_to_leg(leg: RadiossLeg, card: Card) -> None:
-    """Add a card in an engine file to its engine run."""
+    """Add a card of an engine file to its engine run."""
     words = card.words
     if words[:2] in {("RBODY", "ON"), ("RBODY", "OFF")}:
         leg.switched.append(
@@ -227,7 +227,7 @@ def _add_to_leg(leg: RadiossLeg, card: Card) -> None:
 
 
 def _read_start(card: Card) -> InitialVelocity:
-    """Read the nodes of an /INIV; type 0 lists nodes, type 1 node ranges, and type 2 a node group.
+    """Read the nodes of an /INIV: type 0 lists nodes, type 1 node ranges, and type 2 a node group.
 
     Source: Altair's public help for /INIV, and the published source of OpenRadioss.
     """
@@ -294,14 +294,14 @@ class Starter:
 
     @cached_property
     def version(self) -> int:
-        """Return the input version given in /BEGIN; 0 if the deck gives no version."""
+        """Return the input version given in /BEGIN; 0 if the deck gives none."""
         begin_cards = [card for card in self.named("BEGIN") if card.rows]
         rows = get_lines_below_title(begin_cards[-1]) if begin_cards else ()
         return begin_cards[-1].integer(rows[0], BEGIN["Invers"]).value if rows else 0
 
     @property
     def bodies(self) -> Sequence[Body]:
-        """Return the rigid bodies, each with all bodies merged into it.
+        """Return the rigid bodies, each together with all bodies merged into it.
 
         A body of /RBODY/LAGMUL, whose keyword has its id elsewhere, is never switched.
         """
@@ -394,7 +394,7 @@ class Starter:
 
     @cached_property
     def groups(self) -> Mapping[int, tuple[str, tuple[int, ...]]]:
-        """Return the kind of the members (NODE, PART, SUBSET or GRNOD) and their ids, keyed by node group."""
+        """Return the kind of the members (NODE, PART, SUBSET or GRNOD) and their ids, by node group."""
         group_cards = (card for card in self.named("GRNOD") if card.words[1:])
         written = {
             get_number(card, 2): (card.words[1], _read_ids(get_lines_below_title(card)))
@@ -425,7 +425,7 @@ class Starter:
 
     @property
     def unturned(self) -> dict[int, str]:
-        """Return the element kind of solids whose stresses do not rotate with a rigid body, keyed by part id."""
+        """Return the element kind of solids whose stresses do not rotate with a rigid body, by part id."""
         defaults = [
             _read_isolid_and_iframe(card, card.rows[0])
             for card in self.named("DEF_SOLID")
@@ -488,7 +488,7 @@ class Starter:
         return nodes, parts
 
     def _nodes_in_ranges(self, ends: Sequence[int]) -> Iterator[int]:
-        """Yield the nodes of the deck that lie in ranges given as pairs of first and last node."""
+        """Yield the nodes of the deck in ranges that are given as pairs of first and last node."""
         ranges = [
             range(first, last + 1)
             for first, last in zip(ends[::2], ends[1::2], strict=False)

@@ -1,4 +1,4 @@
-"""Recognise the files of a Radioss run and name its possible flaws without reading the deck."""
+"""Recognise the files of a Radioss run, and name its possible flaws without reading the deck."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def is_radioss(head: bytes) -> bool:
 
 
 def list_run_files(path: str) -> list[str]:
-    """Return the files of the run that ``path`` belongs to; empty if it is not a file of a Radioss run.
+    """Return the files of the run to which ``path`` belongs; empty if it is not a file of a Radioss run.
 
     The starter deck ``NAME_0000.rad`` and the engine files ``NAME_0001.rad`` and so on in one folder belong together. A
     file of another name belongs to the run that it names in /BEGIN or /RUN.
@@ -87,7 +87,7 @@ def list_run_files(path: str) -> list[str]:
 
 
 def find_root(path: str) -> str:
-    """Return the common beginning of a run's file names, such as ``NAME`` for ``NAME_0001.rad``; otherwise empty.
+    """Return the beginning that a run's file names share, such as ``NAME`` for ``NAME_0001.rad``; otherwise empty.
 
     The engine looks for the restart file whose name begins like its own file, whatever the name in /RUN is. Source:
     runs computed with OpenRadioss.

@@ -1,4 +1,4 @@
-"""Find flaws that ruin a Radioss run with switched rigid bodies although the starter at most issues a warning.
+"""Find flaws that ruin a Radioss run with switched rigid bodies although the starter issues at most a warning.
 
 Source: the published source of OpenRadioss at bd4557ba7 (kinchk.F, checkrby.F, hm_read_rwall_*.F, lecinv.F), Altair's
 public help for /RWALL, /RBODY, /INIVEL and /INIV, and runs computed with OpenRadioss.
@@ -66,7 +66,7 @@ class NodeGroups:
 
     @cached_property
     def by_part(self) -> Mapping[int, Integers]:
-        """Return the node ids, keyed by part id; parts with particles are left out, because particles are not read."""
+        """Return the node ids by part id, without parts that contain particles, because particles are not read."""
         nodes_by_part: dict[int, list[Integers]] = {
             part: [np.empty(0, np.int64)] for part in self._starter.parts
         }
@@ -131,7 +131,7 @@ def find_flaws(run: RadiossRun, switched: Collection[int]) -> tuple[Flaw, ...]:
 
 
 def _make_unknown(group: int, whose: str, field: CardField) -> Flaw:
-    """Return a flaw which reports that the nodes of a group are unknown."""
+    """Return a flaw that reports that the nodes of a group are unknown."""
     message = f"the nodes of group {group} of {whose} are unknown, so nodes of rigid bodies in it were not checked"
     return Flaw(NOT_FOLLOWED, field, message)
 
@@ -210,7 +210,7 @@ def _find_nodes_near_wall(
         if not (ids == node).any():
             return None
         points[0] = coordinates[ids == node][0]
-    # Non-numeric fields give NaN, which must not cause numpy warnings.
+    # Fields that are not numbers give NaN, which must not cause numpy warnings.
     with np.errstate(invalid="ignore", over="ignore"):
         distance = _compute_distance(kind, coordinates, points, diameter / 2)
     if distance is None:
@@ -351,7 +351,7 @@ def _check_starts(
 def _find_moved_nodes(
     start: InitialVelocity, groups: NodeGroups, nodes: frozenset[int]
 ) -> frozenset[int]:
-    """Return the nodes among ``nodes`` that an /INIV moves."""
+    """Return those of ``nodes`` that an /INIV moves."""
     listed = (
         node
         for node in nodes

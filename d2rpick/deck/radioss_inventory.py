@@ -106,7 +106,7 @@ _AREA_LINE: Final = {
     "TYPE3": 2,
     "TRUSS": 0,
     "TYPE2": 0,
-}  # Number of the line below the title that contains the area, keyed by property type.
+}  # Number of the line below the title that contains the area, by property type.
 _SPRING: Final = {"SPRING", "TYPE4"}
 _OTHER_SPRINGS: Final = {
     "SPR_GENE",
@@ -125,7 +125,7 @@ _OTHER_SPRINGS: Final = {
 _OF_SPRINGS: Final = _SPRING | _OTHER_SPRINGS
 _DEFAULT_SHELL, _DEFAULT_TRIANGLE, _DEFAULT_SOLID = 1, 2, 1
 
-# Other keywords that connect parts; d2rpick does not read which parts they connect.
+# Other keywords that connect parts; d2rpick does not read which parts these keywords connect.
 _OTHER_TIES: Final = ("RBE2", "RBE3", "RLINK", "MPC")
 _MOTIONS: Final = ("IMPVEL", "IMPDISP", "IMPACC")
 _AXES: Final = "XYZ"
@@ -162,7 +162,7 @@ def read_radioss_inventory(run: RadiossRun) -> Inventory:
     notes = (*_collect_notes(run, starter), *mesh.doubts(starter.parts.keys(), "/"))
     windows = find_run_windows(run).windows.windows if run.legs else ()
     joints = _find_joints(run, starter)
-    # Without an engine file, all bodies may be switched.
+    # If there is no engine file, all bodies may be switched.
     switched = run.named if run.legs else {body.node.value for body in starter.bodies}
     rigid = _find_always_rigid(windows) | find_parts_of_fixed_bodies(run)
     local_nodes = _find_watched_nodes(starter, local=True)
@@ -395,7 +395,7 @@ def _read_flags(card: Card, rows: Sequence[Row]) -> list[int]:
 
 
 def _read_positive(rows: Sequence[str], row: int, column: CardColumn) -> float | None:
-    """Read a positive number from a column; None if the field contains anything else."""
+    """Read a positive number from a column; None for any other content."""
     value = parse_real(column.cut(rows[row])) if row < len(rows) else 0.0
     return value if value > 0 else None
 
@@ -468,7 +468,7 @@ def _find_holds(run: RadiossRun, starter: Starter) -> Iterator[model.Hold | str]
 
 
 def _find_support(card: Card, rows: Sequence[Row]) -> model.Hold | None:
-    """Read a /BCS card. In local axes, it always counts as a support, unless it fixes all translations."""
+    """Read a /BCS card. In local axes, it is always treated as a support unless it fixes all translations."""
     moves, turns = (SUPPORT[name].cut(rows[0].text) for name in ("Tra", "Rot"))
     axes = frozenset(axis for axis, code in enumerate(moves) if code == "1")
     if not axes and "1" not in turns:
@@ -587,13 +587,13 @@ def _read_functions(starter: Starter) -> Iterator[tuple[int, tuple[float, ...]]]
         )
 
 
-# Joints connect parts that do not share nodes; they are ties, and rigid bodies that are always active.
+# Joints connect parts that do not share nodes; they are ties and rigid bodies that are always active.
 # Joints must be inactive while a part is rigid, because a node cannot belong to two rigid bodies.
-# The source of the rule on joints is Altair's help on incompatible kinematic conditions.
+# The rule on joints comes from Altair's help on incompatible kinematic conditions.
 
 
 def _find_joints(run: RadiossRun, starter: Starter) -> model.Joints:
-    """Return the tied interfaces (/INTER/TYPE2) whose main surface belongs to one part, and the rigid bodies.
+    """Return the rigid bodies, and the tied interfaces (/INTER/TYPE2) whose main surface belongs to one part.
 
     A rigid body that no engine file and no sensor switches is always on, and connects the parts of its nodes. Without
     engine files all bodies may be switched.

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 # Kinds of ids in /MERGE/RBODY: a rigid body, a node, a node group, or the body of a part with Irigid.
 BODY, NODE, GROUP, OF_PART = 1, 2, 3, 4
-# First id of the node groups that d2rpick adds; it is larger than any id of a deck.
+# First id of the node groups that d2rpick adds; it is larger than any id in a deck.
 MADE_HERE: Final = 10**10
 
 
@@ -151,7 +151,7 @@ def _add_main_nodes(
 
 
 def _join_groups(members: Sequence[Group], groups: dict[int, Group]) -> int:
-    """Return the id of a node group that contains all members; if there is none, add a group to ``groups``."""
+    """Return the id of a node group that contains all members; if there is none, add one to ``groups``."""
     if not members:
         return 0
     if len(members) == 1 and members[0][0] == "GRNOD":

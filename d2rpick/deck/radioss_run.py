@@ -67,7 +67,7 @@ class RadiossRun:
     deck: Deck
     starter: Starter | None = None
     legs: list[RadiossLeg] = field(default_factory=list)
-    # Include files, keyed by path, so that a file that is included twice is read only once.
+    # Include files by path, so that a file that is included twice is read only once.
     included: dict[str, SourceFile] = field(default_factory=dict)
 
     @cached_property
@@ -81,7 +81,7 @@ class RadiossRun:
 
     @cached_property
     def resets(self) -> Mapping[int, float]:
-        """Return the time of the first reset (/SENS/RESET) at the start of an engine run [time], keyed by sensor id."""
+        """Return, by sensor id, the time of the first reset (/SENS/RESET) at the start of an engine run [time]."""
         first_resets: dict[int, float] = {}
         start = 0.0
         for leg in self.legs:
@@ -158,7 +158,7 @@ def _read_starter(source: SourceFile, run: RadiossRun, chain: tuple[str, ...]) -
 def _read_include(
     card: Card, source: SourceFile, run: RadiossRun, chain: tuple[str, ...]
 ) -> None:
-    """Add the file that an #include names, or record why the file was not read."""
+    """Add the file that an #include names, or record why it was not read."""
     from pathlib import Path  # Imported here to keep start-up fast.
 
     words = card.block.head.split(maxsplit=1)[1:]
@@ -196,7 +196,7 @@ class LegSwitch(SwitchSet):
 
 @dataclass(eq=False, repr=False)
 class RunWindows:
-    """Rigid windows of a run, the cards that cause them, and the parts of the bodies (if known), keyed by main node."""
+    """Rigid windows of a run, the cards that cause them, and the parts of the bodies (if known) by main node."""
 
     windows: Windows
     sets: tuple[LegSwitch, ...]
@@ -382,7 +382,7 @@ def _make_window_of_rigid_part(body: Body) -> SwitchWindow:
 def find_rigid_parts(
     starter: Starter, bodies: Mapping[int, int]
 ) -> dict[int, set[int]]:
-    """Return the parts that the group of a body names or whose nodes all belong to this group, keyed by body.
+    """Return, by body, the parts that the group of the body names or whose nodes all belong to this group.
 
     Parameters
     ----------
@@ -403,7 +403,7 @@ def find_rigid_parts(
         for node in bodies
     }
     all_parts = starter.parts.keys()
-    # Other parts, such as a skin, may use only nodes of the named parts.
+    # Other parts, e.g. a skin, may use only nodes of the named parts.
     incomplete = {
         node: found for node, found in known_members.items() if all_parts - found[1]
     }
@@ -441,7 +441,7 @@ def find_parts_off(run: RadiossRun) -> tuple[int, ...]:
 
 
 def find_parts_of_fixed_bodies(run: RadiossRun) -> set[int]:
-    """Return the parts of the bodies that are always active, because no engine run and no sensor switches them.
+    """Return the parts of the bodies that are always active because no engine run and no sensor switches them.
 
     If there are no engine files, all bodies of /RBODY may be switched, but bodies of parts with Irigid stay rigid.
     """
@@ -530,7 +530,7 @@ def find_left_rigid(
 
 
 def _list_body_names(bodies: Sequence[Body]) -> str:
-    """Return the names of bodies, including their ids, or the part id of a rigid part."""
+    """Return the names of bodies with their ids, or the part id of a rigid part."""
     ids = [body.id for body in bodies if body.id]
     parts = sorted(body.part for body in bodies if body.part)
     names = [f"/RBODY {', '.join(format_ranges(ids))}"] * bool(ids)

@@ -35,7 +35,7 @@ STOPS_SINCE: Final = 2023
 NEVER: Final = 1e20  # Times from this value on are treated as never reached.
 # Kinds of force sensors, each with the name of the corresponding force in histories.
 _OF_FORCES: Final = {"INTER": "interface", "RWALL": "rigid wall"}
-# Types of /INTER that exert no contact force on a flying body, for example ties.
+# Types of /INTER that exert no contact force on a flying body, e.g. ties.
 WITHOUT_FORCE: Final = {"TYPE1", "TYPE2", "TYPE9", "TYPE12", "TYPE18", "SUB"}
 # Relative rounding error of times in a T01 file [-], which have seven digits.
 _SINGLE: Final = 1e-6

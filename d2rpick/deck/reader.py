@@ -84,7 +84,7 @@ _MESH: Final = (
     r"\*(ELEMENT_|NODE\b)|"
     r"/(NODE|SHELL|SH3N|BRICK|TETRA4|TETRA10|PENTA6|QUAD|TRIA|BEAM|TRUSS|SPRING|BRIC20|SHEL16|SPHCEL|XELEM)(/|\s*\Z)"
 )
-# Engine keywords that require values; a file that ends with one of these keyword lines is truncated.
+# Engine keywords that require values; a file that ends with such a keyword line is truncated.
 _WITH_VALUES: Final = (
     "RUN",
     "RBODY",
@@ -222,7 +222,7 @@ class Deck:
     scope: Scope = field(default_factory=Scope)
     sources: list[SourceFile] = field(default_factory=list)
     ends: list[tuple[Block, bool]] = field(default_factory=list)
-    # True if the main file is in long format where it ends.
+    # True if the main file is in long format at its end.
     long: bool = False
     # Restarts of the run, keyed by file name.
     restarts: dict[str, Restart] = field(default_factory=dict)
@@ -242,7 +242,7 @@ class Deck:
 
     @cached_property
     def _by_name(self) -> Mapping[str, Sequence[Card]]:
-        """Return the cards, keyed by name and by each prefix of the name before a ``_``; rules use both as keys."""
+        """Return the cards by name and by each prefix of the name before a ``_``; rules use both as keys."""
         cards_by_name: defaultdict[str, list[Card]] = defaultdict(list)
         for card in self.cards:
             for name in _list_stems(card.name):
@@ -260,7 +260,7 @@ class Deck:
 
     @property
     def silencing(self) -> list[Card]:
-        """Return the cards that are preceded by a comment that silences rules."""
+        """Return the cards preceded by a comment that silences rules."""
         return [
             card
             for card in self._all
@@ -269,7 +269,7 @@ class Deck:
 
     @property
     def _all(self) -> list[Card]:
-        """Return all cards that a finding may refer to."""
+        """Return all cards to which a finding may refer."""
         return [*self.cards, *self.disabled, *self.included]
 
     @cached_property
@@ -344,7 +344,7 @@ class _Reader:
         self.deck = deck
         # Folders named by *INCLUDE_PATH, in the order of the cards.
         self.folders: list[Path] = []
-        # Files, keyed by path, so that a file that is included twice is read only once.
+        # Files by path, so that a file that is included twice is read only once.
         self.sources: dict[str, SourceFile] = {}
 
     def read(self, source: SourceFile, context: _Context) -> None:
@@ -387,7 +387,7 @@ class _Reader:
             )
 
     def take(self, card: Card, context: _Context, width: int) -> None:
-        """Store a card, or act on it if it is an instruction to the reader."""
+        """Store a card or, if it is an instruction to the reader, act on it."""
         if card.name.startswith("COMMENT"):
             if re.search(
                 r"\*(DEFORMABLE_TO_RIGID|RIGID_DEFORMABLE)",

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 def write_time_sensor(
     number: int, title: str, start: float, stop: float | None = None
 ) -> str:
-    """Return the card of a sensor that is active from ``start`` on, or only until ``stop`` if it is given [time]."""
+    """Return the card of a sensor that is active from ``start`` on, or only until ``stop`` if this is given [time]."""
     text = f"/SENSOR/TIME/{number}\n{title}\n{DELAY.write(Tdelay=write_number(start, 20))}\n"
     if stop is None:
         return text

@@ -21,16 +21,16 @@ if TYPE_CHECKING:
     from d2rpick.deck.stored import DeckOnDisk
 
 
-# Number of bytes that are searched at a time; they fit into the processor cache.
+# Number of bytes that are searched at a time, so that they fit into the processor cache.
 _SEARCHED: Final = 3 << 18
-# Number of additional threads; they copy bytes in parallel, but only one thread can search at a time.
+# Number of additional threads, which copy bytes in parallel although only one thread can search at a time.
 _HELPERS: Final = 1
 # Number of blocks that one thread searches before a second thread starts.
 _ALONE: Final = 4
-# Number of bytes before a block that are searched again, because a mark may extend across the start of the block.
+# Number of bytes before a block that are searched again, because a mark may extend across the block's start.
 _LOOKBACK: Final = 32
 _PGP: Final = b"-----BEGIN PGP MESSAGE"
-# Offset of a letter of the mark that does not occur in mesh data; the search for this letter is therefore fast.
+# Offset of a letter of the mark that does not occur in mesh data, so that the search for this letter is fast.
 _ANCHOR: Final = _PGP.index(b"G")
 BYTE_ORDER_MARK: Final = b"\xef\xbb\xbf"  # Byte order mark of UTF-8.
 
@@ -41,7 +41,7 @@ _COUNTED: Final = 16
 _GZIP: Final = b"\x1f\x8b\x08"
 _FIRST: Final = 1 << 16  # Number of bytes that should contain a line ending.
 _HEAD: Final = 1024  # Largest number of bytes that are read of a keyword line.
-# Number of bytes before a keyword within which comments on it are expected.
+# Number of bytes before a keyword in which comments on it are expected.
 _BEFORE: Final = 4096
 # This pattern is compiled on first use to keep start-up fast.
 _SILENCE: Final = r"[$#]\s*d2rpick:\s*ignore\b[\s:]*((?:D2R\w*[\s,]*)+|\S*)"
@@ -83,7 +83,7 @@ class _Search:
         )
         self._waiting: Iterator[int] = iter(self.pieces)
         self._found: dict[int, Sequence[int]] = {}
-        # Locks of the additional threads; each thread releases its lock when it has finished.
+        # Locks of the additional threads, each of which releases its lock when it has finished.
         self._helping: list[_thread.LockType] = []
 
     def call_for_help(self) -> None:
@@ -287,12 +287,12 @@ class SourceFile:
         return digest.hexdigest()
 
     def ends_with_line(self) -> bool:
-        """Return True if the last line has a line ending, or if the file is empty."""
+        """Return True if the last line has a line ending or the file is empty."""
         return self.read(max(0, self._file.size - 1)) in (b"", b"\n")
 
     @cached_property
     def silences(self) -> bool:
-        """Return True if comments may silence rules. A large file is not searched for them, and the result is True."""
+        """Return True if comments may silence rules; for a large file, this is assumed without a search."""
         return self._file.size > HELD_UP_TO or b"d2rpick" in self.read(0).lower()
 
     def line_at(self, offset: int) -> int:
@@ -311,7 +311,7 @@ class SourceFile:
 
 @dataclass(eq=False, repr=False)
 class Block:
-    """A keyword with all lines up to the next keyword, or an encrypted block, as a byte range in a file."""
+    """A keyword with all lines up to the next keyword, or an encrypted block, as a byte range of a file."""
 
     source: SourceFile
     start: int
@@ -325,7 +325,7 @@ class Block:
 
     @property
     def _comment(self) -> tuple[str, ...]:
-        """Return the characters that begin comment lines: ``$``, plus ``#`` in Radioss files."""
+        """Return the characters that begin comment lines: ``$`` and, in Radioss files, ``#``."""
         return ("$", "#") if self.head.startswith("/") else ("$",)
 
     @cached_property
@@ -334,7 +334,7 @@ class Block:
         return self.source.line_at(self.start)
 
     def lines(self) -> list[tuple[int, str]]:
-        """Return the data lines without comments, each with its distance from the keyword line in lines."""
+        """Return the data lines without comments, each with the number of lines from the keyword line to it."""
         comment = self._comment
         *lines, last = self.source.text(self.start, self.end).split("\n")
         # If this line were kept, the block would contain the spaces before the next keyword.

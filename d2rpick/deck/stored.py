@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 # Largest file that is kept in memory [bytes]; a deck may have thousands of include files.
 HELD_UP_TO: Final = 1 << 18
-# Smallest number of bytes read at a time; the next request is usually for nearby bytes.
+# Smallest number of bytes that are read at a time, because the next request is usually for nearby bytes.
 _WINDOW: Final = 1 << 16
 # Number of blocks of a file that are cached, because the ends of large blocks are read repeatedly.
 _KEPT: Final = 8
@@ -52,7 +52,7 @@ class HeldInMemory:
 
 
 class DeckOnDisk:
-    """The bytes of a file on disk, read on request; raises DeckError if the file has changed.
+    """The bytes of a file on disk, read on request; a DeckError is raised if the file has changed.
 
     At least ``window`` bytes are read at a time.
     """
@@ -60,7 +60,7 @@ class DeckOnDisk:
     def __init__(self, name: str, state: FileState, window: int = _WINDOW) -> None:
         self.size = state.size
         self._name, self._state, self._window = name, state, window
-        # Blocks of the file, keyed by offset, from oldest to newest.
+        # Blocks of the file by offset, from oldest to newest.
         self._windows: dict[int, bytes] = {}
 
     def read(self, begin: int, end: int) -> bytes:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.deck.ls_dyna_parts import (
+    DELETING_FLAGS,
     Constraint,
     find_element_cards,
     read_constraints,
@@ -54,16 +55,15 @@ def find_suiting(path: str, parts: Collection[int]) -> Suiting:
             "radioss", find_name_of_files(run), legs[-1].stop.value if has_end else None
         )
     deck = read_deck(path)
-    bodies = [*read_constraints(deck, "nodal rigid body")]
-    further = [*read_constraints(deck, "extra nodes", "joint")]
     nodal, by_set = (
-        _is_on_parts(constraints, parts, deck) for constraints in (bodies, further)
+        _is_on_parts(_read_deleted(deck, flag), parts, deck)
+        for flag in ("NRBF", "NCSF")
     )
     return Suiting("ls-dyna", None, None, _find_free_ids(deck), nodal, by_set)
 
 
 def find_name_of_files(run: RadiossRun) -> str | None:
-    """Return the common beginning of a run's file names, by which the engine finds the restart file.
+    """Return the beginning that a run's file names share, by which the engine finds the restart file.
 
     If the files have no common name, return the name in /RUN.
     """
@@ -84,6 +84,12 @@ def _find_free_ids(deck: Deck) -> tuple[int, int]:
     return first, first + 1
 
 
+def _read_deleted(deck: Deck, flag: str) -> list[Constraint]:
+    """Return the constraints that a flag deletes; for joints and extra nodes, which either may delete, NCSF is used."""
+    kinds = (kind for kind, flags in DELETING_FLAGS.items() if flags[-1] == flag)
+    return [*read_constraints(deck, *kinds)]
+
+
 def _is_on_parts(
     constraints: Sequence[Constraint], parts: Collection[int], deck: Deck
 ) -> bool:
@@ -99,9 +105,8 @@ def _is_on_parts(
     nodes_elsewhere = find_first_parts(cards, other_parts)
     return all(
         constraint.part in parts
-        or (
-            constraint.nodes & nodes_on_parts.keys()
-            and not constraint.nodes & nodes_elsewhere.keys()
-        )
+        if constraint.part
+        else constraint.nodes & nodes_on_parts.keys()
+        and not constraint.nodes & nodes_elsewhere.keys()
         for constraint in constraints
     )

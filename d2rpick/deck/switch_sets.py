@@ -46,7 +46,7 @@ def write_deformable_lines(
 
 
 def group_by_lead(ids: Sequence[int], printing: Printing) -> dict[int, list[int]]:
-    """Return the parts grouped by their lead part, with parts without a lead part first, under 0."""
+    """Return the parts grouped by their lead part; parts without a lead part come first, under 0."""
     leads = _find_leads(ids, printing)
     by_lead: dict[int, list[int]] = {}
     for part in sorted(ids, key=lambda part: part in leads):

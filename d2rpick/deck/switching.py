@@ -404,7 +404,7 @@ class Unit(NamedTuple):
 
 
 class SwitchEvent(NamedTuple):
-    """A switch of one part or other unit, caused by one line of a card."""
+    """A switch of a part or other unit, caused by one line of a card."""
 
     unit: Unit
     by: SwitchSet

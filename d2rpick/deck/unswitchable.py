@@ -67,7 +67,7 @@ class Unswitchable(NamedTuple):
 def find_unswitchable_in_ls_dyna(
     deck: Deck, parts: DeckParts
 ) -> dict[int, Unswitchable]:
-    """Return the parts of an LS-DYNA deck whose section or material forbids switching, keyed by part id."""
+    """Return the parts of an LS-DYNA deck whose section or material forbids switching, by part id."""
     sections = read_sections(deck)
     laws = {
         name_material(card, card.data[0], MATERIAL["MID"]): card.name
@@ -88,7 +88,7 @@ def find_unswitchable_in_ls_dyna(
 
 
 def find_unswitchable_in_radioss(starter: Starter) -> dict[int, Unswitchable]:
-    """Return the parts of a starter deck that must not be switched, keyed by part id, from materials and properties."""
+    """Return the parts of a starter deck that must not be switched, by part id, from materials and properties."""
     # Imported here to keep start-up fast.
     from d2rpick.deck.radioss_deck import get_number
 

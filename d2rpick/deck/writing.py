@@ -49,7 +49,7 @@ if TYPE_CHECKING:
 
     from d2rpick.deck.printed_card import PrintedCard
 
-# Engine keywords that a later engine run must not repeat; /INIV would set the velocities again.
+# Engine keywords that a later engine run must not repeat, because e.g. /INIV would set the velocities again.
 _ONCE = {
     "INIV",
     "END",
@@ -157,7 +157,7 @@ def _write_ls_dyna(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
 
 
 def _refuse_switched(deck: Deck, printed: Deck) -> None:
-    """Raise DeckError if the deck already switches a part of the printed cards, or uses one of their set ids."""
+    """Raise DeckError if the deck already switches a part on the printed cards, or uses one of their set ids."""
     sets = read_switching(deck)
     printed_sets = read_switching(printed)
     parts = {
@@ -267,7 +267,7 @@ def _read_printed_legs(main: str, card: PrintedCard) -> list[RadiossLeg]:
 def _keep_bodies_off(
     legs: Sequence[RadiossLeg], printed_leg: RadiossLeg, replaced_nodes: Collection[int]
 ) -> Iterator[str]:
-    """Return lines that keep bodies inactive in a printed engine run; otherwise they would be rigid from time 0 on.
+    """Return lines that keep bodies inactive in a printed engine run; otherwise, they would be rigid from time 0 on.
 
     Left out are bodies that the leg switches, and those whose main nodes are ``replaced_nodes``.
     """

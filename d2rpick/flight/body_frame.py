@@ -14,19 +14,19 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import NodeMotion, Samples
     from d2rpick.histories.names import Part
 
-# A function that reads the motion of those of the given nodes whose motion the solver wrote.
+# A function that reads the motion of those given nodes whose motion the solver wrote.
 Displacements = Callable[[Sequence[int]], "NodeMotion | None"]
 
 # Largest deviation of points from their positions in the rotated deck, relative to the size of the body [-].
 # With a larger deviation, the orientation of the body cannot be determined to within 0.1 degrees.
 _MOST_BENT: Final = 0.05
-# If the connected parts have at least this fraction of the mass, only they define the frame of a body [-].
+# If the connected parts have at least this fraction of the body's mass, they alone define its frame [-].
 _MOST: Final = 0.5
-# Points are treated as lying on a line if one moment of inertia is at most this fraction of the others [-].
+# Points are treated as collinear if their smallest moment of inertia is at most this fraction of the others [-].
 _ALONG_LINE: Final = 1e-9
 # Relative error of a time written in single precision [-].
 _ROUNDED_TIME: Final = 1e-6
-# Number of nodes, spread over the body, that define its frame; more nodes would hardly improve it.
+# Number of nodes that define the frame of a body; they are spread over the body, and more would hardly improve it.
 _MOST_NODES: Final = 50
 
 
@@ -114,7 +114,7 @@ def choose_frame_parts(
 
 
 def _estimate_doubt(shape: Samples, bent: Samples, mass: Samples) -> float:
-    """Return how much the rotation between two times varies if each part that defines the frame is omitted in turn.
+    """Return by how much the rotation between two times varies if the parts of the frame are omitted one at a time.
 
     Parts about their centre, (parts, 3), deviate from their shape by ``bent`` (n, parts, 3) (jackknife); two parts on a
     line determine no angle and give 0.

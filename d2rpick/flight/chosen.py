@@ -81,7 +81,7 @@ def choose_flight(
 
 
 def _limit_by_supports(history: History, flight: Flight, td: float) -> Flight:
-    """Limit a flight to the time during which no support holds the parts.
+    """Limit a flight to the time during which no support holds any of the parts.
 
     A flight that was found from the part momenta is already limited in this way.
     """
@@ -120,7 +120,10 @@ def find_flight(
 def _make_seen_flight(
     history: History, seen: Seen, shown: FreeFlight, described: Described | None
 ) -> Flight:
-    """Return the flight that the evidence shows; if energies do not show gravity, an oscillator is used to find it."""
+    """Return the flight that the evidence shows.
+
+    If the energies do not show gravity, use an oscillator to find the flight.
+    """
     gravity = shown.gravity
     if described and seen.source in BY_ENERGIES and isnan(gravity):
         window = described._replace(start=shown.start, end=shown.end)
@@ -271,7 +274,7 @@ def _find_end_of_window(history: History, described: Described) -> float | None:
 
 
 def _detect_load_in_window(history: History, described: Described) -> float:
-    """Return NaN if damping of the vibration cannot explain the energy change in a window, otherwise 0."""
+    """Return NaN if damping of the vibration cannot explain the energy change in a window; otherwise return 0."""
     from d2rpick.flight.work import is_taken_by_damping
 
     if history.balance is None:
@@ -282,7 +285,7 @@ def _detect_load_in_window(history: History, described: Described) -> float:
 
 
 def _explain_why_fed(history: History, start: float, end: float) -> str | None:
-    """Return the reason why, according to the energies, a window cannot be a flight; None if there is none.
+    """Return the reason why, according to the energies, a window cannot be a flight; None if it can be one.
 
     Either kinetic plus internal energy changes, or nothing but the vibration moves.
     """

@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 # Smallest momentum change of the model that shows an external contact, relative to the contact's impulse [-].
 # The output may miss up to 1/3 of the impulse of an intermittent contact.
 _INNER: Final = 0.2
-# _PIECES: number of sections of a flight whose mean energies are compared.
-# _RISE: smallest rise of the mean energy that shows a crash, relative to the highest energy [-].
+# _PIECES: number of sections of a flight whose mean energies are compared with each other.
+# _RISE: smallest rise of the mean energy that indicates a crash, relative to the highest energy [-].
 # In computed flights with many beating modes, the mean energy rises by up to 6 % of the highest energy.
 # In a crash, the mean energy rises from nearly zero to nearly the highest energy.
 _PIECES: Final = 4
@@ -34,7 +34,7 @@ _RISE: Final = 0.1
 
 
 class Touches(NamedTuple):
-    """The intervals with a contact force; ``acts`` (n,) refers to the interval that ends at state ``time`` (n,)."""
+    """The intervals with a contact force. Entry i of ``acts`` (n,) refers to the interval that ends at ``time[i]``."""
 
     time: Samples
     acts: NDArray[np.bool_]

@@ -22,15 +22,15 @@ if TYPE_CHECKING:
     from d2rpick.histories.contact_forces import ContactForce
     from d2rpick.histories.history import Momenta, Samples
 
-# Smallest momentum change that shows a force, relative to the largest deviation in the longest flight [-].
+# Smallest momentum change that indicates a force, relative to the largest deviation in the longest flight [-].
 _SEEN: Final = 4.0
-# Largest force that is ignored, relative to the weight [-]; the first momenta are half a time step old.
+# Largest force that is ignored, relative to the weight [-]; it allows for first momenta that are half a step old.
 _OF_WEIGHT: Final = 0.1
 # Number of states omitted at each end of the longest flight, because a contact force may act in them.
 _EDGE: Final = 1
-# Smallest number of output intervals in the longest flight without its ends.
+# Smallest number of output intervals in the longest flight after its ends have been omitted.
 _FEWEST: Final = 2
-# Assumed duration of a force that a single interval shows, centred in the interval, as a fraction of it [-].
+# If a force appears in a single interval, it is assumed to act for this fraction of the interval around its middle [-].
 _OF_ONE_INTERVAL: Final = 1 / 3
 
 

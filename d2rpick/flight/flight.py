@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cache, partial
+from functools import partial
 from math import isfinite, isinf
 from typing import TYPE_CHECKING, Final
 
@@ -33,9 +33,9 @@ if TYPE_CHECKING:
 _SURE: Final = ("given", "momentum", "oscillator")
 BY_ENERGIES: Final = ("contact-energy", "energy-balance")
 # Largest work of a load on the parts in a flight, relative to their internal energy [-].
-# This work causes a deformation error of 2 %; smaller errors do not affect the ranking of pairs.
+# Such work changes the deformation by 2 %; smaller changes do not affect the ranking of pairs.
 MOST_WORK: Final = 0.04
-# Sources that must confirm each flight from a more reliable source, because they cover the contacts of all parts.
+# Sources that cover the contacts of all parts, so they must confirm each flight from a more reliable source.
 _AGREEING: Final = ("contact-force", "contact-energy")
 # Sources that may miss a load, because some forces are not written and fixed walls do no work.
 _PARTIAL: Final = (*BY_ENERGIES, "contact-force")
@@ -97,63 +97,71 @@ class Flight(NamedTuple):
 
 
 def _explain_nothing(_: float) -> None:
-    """Return no contradiction for any time, as the default for ``explain_contradiction``."""
+    """Return None for every time; the default for ``explain_contradiction``."""
 
 
 class Witness(NamedTuple):
-    """A source of evidence for flights: the flight ``around`` a time, and all ``flights`` in ascending order.
+    """A source of evidence for flights in a history, with times (n,), and the function that searches for a flight.
 
     If ``decisive`` is True, the source can exclude a flight at a time even if it shows no flight anywhere.
     ``explain_contradiction`` returns, for a time at which the momentum alone shows a flight, what speaks against it.
     """
 
+    history: History
     source: str
     time: Samples
-    around: Callable[[float], FreeFlight | None]
-    flights: Callable[[], tuple[FreeFlight, ...]]
+    search: Callable[[float], FreeFlight | None]
     decisive: bool
-    explain_contradiction: Callable[[float], str | None]
+    explain_contradiction: Callable[[float], str | None] = _explain_nothing
 
-    @classmethod
-    def of(
-        cls,
-        source: str,
-        time: Samples,
-        around: Callable[[float], FreeFlight | None],
-        *,
-        decisive: bool,
-        explain_contradiction: Callable[[float], str | None] = _explain_nothing,
-    ) -> Witness:
-        """Make a source of evidence over the times ``time`` (n,) that computes each flight, and their list, once."""
-        once = cache(around)
-        return cls(
-            source,
-            time,
-            once,
-            cache(
-                partial(
-                    find_all_windows,
-                    time,
-                    partial(_find_flight_from_middle, time, once),
-                )
-            ),
-            decisive,
-            explain_contradiction,
-        )
+    def around(self, moment: float) -> FreeFlight | None:
+        """Return the flight around a time; each flight is searched for only once."""
+        return _search_once(self.history, self.source, moment, search=self.search)
+
+    def flights(self) -> tuple[FreeFlight, ...]:
+        """Return all flights in ascending order; they are searched for only once."""
+        return _list_flights(self.history, self.source, witness=self)
 
     def holding(self, td: float) -> FreeFlight | None:
-        """Return the flight around td, searched from a fixed time within it if possible, otherwise from td."""
+        """Return the flight around td.
+
+        The search starts from a fixed time within the flight if possible, otherwise from td.
+        """
         return _find_flight_with_td(self.time, self.around, td)
 
     def counts(self) -> bool:
-        """Return True if a time at which this source shows no flight is certainly in no flight."""
+        """Return True if td is certainly in no flight whenever this source shows none."""
         return self.decisive or bool(self.flights())
+
+
+@remember
+def _search_once(
+    _: History,
+    _source: str,
+    moment: float,
+    *,
+    search: Callable[[float], FreeFlight | None],
+) -> FreeFlight | None:
+    """Return the flight that a source of evidence in a history shows around a time."""
+    return search(moment)
+
+
+@remember
+def _list_flights(
+    _: History, _source: str, *, witness: Witness
+) -> tuple[FreeFlight, ...]:
+    """Return all flights that a source of evidence in a history shows, in ascending order."""
+    find_flight = partial(_find_flight_from_middle, witness.time, witness.around)
+    return find_all_windows(witness.time, find_flight)
 
 
 def _find_flight_with_td(
     time: Samples, around: Callable[[float], FreeFlight | None], td: float
 ) -> FreeFlight | None:
-    """Return the flight around ``td``, searched from a time shared by many td if possible, otherwise from td."""
+    """Return the flight around ``td``.
+
+    The search starts from a time shared by many td if possible, otherwise from td.
+    """
     shared = filter(None, map(around, list_marks(time, td)))
     return next(
         (flight for flight in shared if flight.start <= td <= flight.end), None
@@ -175,7 +183,7 @@ def _find_flight_from_middle(
 
 
 class Seen(NamedTuple):
-    """Evidence for a td: the flight around it, or the nearest flight and the reason why td is not in a flight.
+    """Evidence for a td: the flight around td, or the nearest flight and the reason why td is not in a flight.
 
     ``held`` is True if supports hold the parts, which also overrules a given end of the load.
     """
@@ -285,17 +293,10 @@ def _make_witnesses(history: History) -> Iterator[Witness]:
         from d2rpick.flight import momentum
 
         momenta = momentum.select_momenta_for_flight(history.momenta)
-        around = partial(_find_flight_by_momentum, history, momenta)
+        search = partial(_find_flight_by_momentum, history, momenta)
         decisive = any(momentum.can_deny_flight(candidate) for candidate in momenta)
-        yield Witness.of(
-            "momentum",
-            momenta[0].time,
-            around,
-            decisive=decisive,
-            explain_contradiction=partial(
-                _explain_contradicted_momentum, history, momenta
-            ),
-        )
+        explain = partial(_explain_contradicted_momentum, history, momenta)
+        yield Witness(history, "momentum", momenta[0].time, search, decisive, explain)
     forces = history.evidence.forces
     whole = history.find_momenta(of_parts=False)
     touches = None
@@ -307,11 +308,9 @@ def _make_witnesses(history: History) -> Iterator[Witness]:
     balance = history.balance
     is_better_known = bool(history.momenta)
     if touches is not None:
-        by_forces = Witness.of(
-            "contact-force",
-            touches.time,
-            partial(_find_flight_by_forces, history, touches),
-            decisive=False,
+        search = partial(_find_flight_by_forces, history, touches)
+        by_forces = Witness(
+            history, "contact-force", touches.time, search, decisive=False
         )
         is_better_known = is_better_known or bool(by_forces.flights())
         yield by_forces
@@ -320,20 +319,19 @@ def _make_witnesses(history: History) -> Iterator[Witness]:
     from d2rpick.flight import work
 
     if work.has_visible_contacts(balance):
-        around = partial(
+        search = partial(
             _find_flight_by_energies,
             history,
             work.find_plateau,
             level=not is_better_known,
         )
-        yield Witness.of("contact-energy", balance.time, around, decisive=False)
+        yield Witness(history, "contact-energy", balance.time, search, decisive=False)
     if work.has_laws(balance):
-        around = partial(
+        search = partial(
             _find_flight_by_energies, history, work.find_balanced_window, level=True
         )
-        yield Witness.of(
-            "energy-balance", balance.time, around, decisive=balance.worked is not None
-        )
+        is_decisive = balance.worked is not None
+        yield Witness(history, "energy-balance", balance.time, search, is_decisive)
 
 
 def _explain_contradicted_momentum(
@@ -422,7 +420,7 @@ def _find_flight_by_energies(
 def _find_flight_by_forces(
     history: History, touches: Touches, td: float
 ) -> FreeFlight | None:
-    """Return the flight around td from contact forces, limited to times with one energy level if the energy rises.
+    """Return the flight around td from contact forces, limited to a period with one energy level if the energy rises.
 
     Before the first contact has ended, another kind of load may act, which only the external work shows.
     """
@@ -450,7 +448,7 @@ def _limit_to_level(
     td: float,
     momenta: Momenta | None = None,
 ) -> FreeFlight | None:
-    """Limit a flight to the time span in which the internal energy stays on one level; None if td is before that span.
+    """Limit a flight to the period in which the internal energy stays on one level; None if td is before that period.
 
     ``momenta`` are those that show the flight.
     """
@@ -487,7 +485,7 @@ def _limit_to_level(
         driven=isinf(flight.gravity),
     )
     if start is not None and start > flight.start and momenta is not None:
-        # The last sum of energies excludes the work of gravity, whereas the first sum includes it.
+        # The last sum of energies excludes the work of gravity; the first sum includes it.
         whole = None if damped is None else damped[-1 if flight.gravity else 0]
         if rises_as_it_yields(time, energy, whole, flight.start, start, flight.end):
             start = flight.start
@@ -507,7 +505,7 @@ def _limit_to_level(
 def _find_nearest(
     witness: Witness, td: float, refusal: str, doubts: tuple[str, ...]
 ) -> Seen:
-    """For a td outside of flights, return the last flight before it if there is one, otherwise the next one."""
+    """For a td outside all flights, return the last flight before td if there is one, otherwise the next flight."""
     flights = witness.flights()
     earlier_flights = [flight for flight in flights if flight.end < td]
     nearest = (
@@ -517,7 +515,7 @@ def _find_nearest(
 
 
 def name_source(source: str | None) -> str:
-    """Return a phrase that names the data that show a flight."""
+    """Return a phrase that names the data from which a flight was found."""
     return str(source).replace("-", " ")
 
 
@@ -556,7 +554,7 @@ def _join_evidence(history: History, *shown_flights: tuple[str, FreeFlight]) -> 
 
 
 def get_agreement_limit(history: History, start: float, end: float) -> float:
-    """Return the largest difference between the ends of a flight in two sources that agree [time]."""
+    """Return the largest difference at which the ends of a flight in two sources agree [time]."""
     return max(_SAME * (end - start), _SAME_STATES * history.step)
 
 

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Balance, Momenta, Samples
 
 # _GRAVITY: gravity in m, inches and feet per second squared; other units change it by a power of 10.
-# _ALIKE: largest relative deviation of an acceleration treated as gravity [-]; 1 in 200 loads lies within it.
+# _ALIKE: accelerations that differ by at most this fraction are treated as equal to gravity [-]; 1 in 200 loads do.
 _GRAVITY, _ALIKE = (9.80665, 386.089, 32.1740), 0.002
 # Usual values of gravity in decks in m, inches and feet per second squared, up to a power of 10.
 _OF_DECKS = (9.80665, 9.81, 9.8, 9.807, 3.86089, 3.864, 3.86, 3.2174, 3.22)
@@ -51,20 +51,20 @@ _SHOWN = 0.1
 # If only some of the moving parts are tested, TOLERANCE replaces this limit, because other parts act on them.
 _ENOUGH = 3e-3
 # The next three constants are used to find gravity perpendicular to a load of constant direction.
-# _REACH_OF_NOISE: largest deviation of the momentum component perpendicular to the load due to noise [rounding errors].
-# _SEEN: smallest component perpendicular to the load of an axis along which gravity may act [-].
+# _REACH_OF_NOISE: momentum perpendicular to the load may deviate by this because of noise [rounding errors].
+# _SEEN: gravity is sought along an axis only if at least this component of the axis is perpendicular to the load [-].
 # _CLEARLY: smallest ratio of the deviation along the load to the deviation perpendicular to it [-].
 _REACH_OF_NOISE, _SEEN, _CLEARLY = 2.0, 0.1, 30.0
-# _FADED: largest force in the last third of a window in which a force fades, relative to the first third [-].
-# _LITTLE: largest force at the end of a window in which a force fades, relative to the weight [-].
+# _FADED: a force fades if its maximum in the last third of a window is at most this fraction of the first third's [-].
+# _LITTLE: largest remaining force at the end of a window in which a force fades, relative to the weight [-].
 _FADED, _LITTLE = 0.6, 0.02
-# Largest momentum perpendicular to the direction of a straight motion, relative to the momentum [-].
+# In a straight motion, the momentum perpendicular to the motion is at most this fraction of the momentum [-].
 _STRAIGHT = 0.01
-# Largest change of momentum that is treated as zero, in multiples of the fitting error [-].
+# Changes of momentum up to this multiple of the fitting error are treated as zero [-].
 _UNSEEN = 2.0
 # Relative error of the work of gravity computed from the states [-].
 _OF_WORK = 2e-3
-# A mass that exceeds the lower bound from momenta and energies by this fraction was written by the solver [-].
+# A mass that exceeds the lower bound from momenta and energies by this fraction must come from the solver [-].
 _CLEARLY_HEAVIER = 1e-6
 
 
@@ -104,12 +104,12 @@ class Laws:
             return window, gravity
         window = self._lasting(self._steady, td)
         if window:
-            return (None if self._carried else window), None
+            return (None if self.is_carried else window), None
         window = self._lasting(self._steady, td, self._enough)
         if (
             window and not self._falls_across
         ):  # A push that briefly balances the weight keeps the momentum constant, too.
-            return (None if self._carried else window), None
+            return (None if self.is_carried else window), None
         return self._under_gravity(td)
 
     def gravity(self, first: int, last: int) -> float | None:
@@ -128,8 +128,8 @@ class Laws:
         )
 
     @property
-    def _carried(self) -> bool:
-        """Return True if the parts must be carried by a support whenever no force on them is visible."""
+    def is_carried(self) -> bool:
+        """Return True if the parts must be held by a support whenever no force on them is visible."""
         return self.fall if self.gravities is None else 0.0 not in self.gravities
 
     def _is_gravity(self, acceleration: float, error: float = _ALIKE) -> bool:
@@ -142,14 +142,14 @@ class Laws:
         )
 
     def _braked(self, first: int, last: int) -> bool:
-        """Return True if a load, unlike damping, stops the parts within a few states or almost completely."""
+        """Return True if a load, unlike damping, stops the parts completely or within a few states."""
         largest, final_size = (
             float(np.abs(self.fit.momentum[slice(at, last + 1)]).max())
             for at in (0, first)
         )
         length = float(self.fit.time[last] - self.fit.time[first])
         damping = self.fit.damping(first, last)
-        return damping * length > max(_DAMPED, _SHOWN * (last - first)) or (
+        return damping > self.fit.limit_damping(first, last) or (
             final_size < _LEFT * largest and damping * length > _DAMPED
         )
 
@@ -255,7 +255,7 @@ class Laws:
         force = float(np.linalg.norm(vector))
         mass = self.mass if self.mass > 0 else float("nan")
         if force * (end - start) <= _UNSEEN * (TOLERANCE * self.extent + self.noise):
-            return None if self._carried else 0.0
+            return None if self.is_carried else 0.0
         if self._is_gravity(
             force / mass,
             _ALIKE + _REACH_OF_DIGITS * self.noise / (force * (end - start)),
@@ -281,7 +281,7 @@ class Laws:
         return float("nan") if self._may_be_heavier(force, start, end) else None
 
     def _may_be_heavier(self, force: float, start: float, end: float) -> bool:
-        """Return True if a force may be the weight of a mass above the lower bound that the kinetic energy implies.
+        """Return True if a force may be the weight of a mass larger than the lower bound implied by the kinetic energy.
 
         At the state that shows the largest mass, as much kinetic energy may belong to the vibration as the internal
         energy swings.
@@ -458,6 +458,11 @@ class FreeFall(Law):
     def damping(self, first: int, last: int) -> float:
         """Return the least-squares damping rate alpha between two states [1/time]."""
         return self._fitted(first, last)[2]
+
+    def limit_damping(self, first: int, last: int) -> float:
+        """Return the largest alpha between two states that is damping [1/time]; a load slows the parts down more."""
+        length = float(self.time[last] - self.time[first])
+        return max(_DAMPED, _SHOWN * (last - first)) / length
 
     def gravity(self, first: int = 0, last: int = -1) -> Samples:
         """Return the gravity fitted between two states (default: all states), shape (components,) [momentum/time]."""

@@ -24,38 +24,38 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Balance, History, Samples
 
 
-# Widening of the energy band before td, as a fraction of the band [-]; the band may not cover a whole oscillation.
+# Widening of the energy band before td, as a fraction of the band width [-]; the band may miss part of an oscillation.
 _BAND_RESERVE: Final = 0.25
-# Fraction of the time before td that is not used for the energy band [-], because the load may still act in it.
+# Fraction of the time before td that is excluded from the energy band [-], because the load may still act in it.
 # In 45 computed runs, the energy entered its band too early by up to 30 % of the time before td.
 _WAIT: Final = 1 / 3
 # _OUTER: fraction of the lowest and of the highest energies that lie outside the usual range [-].
 # _LATEST: fraction of the time before td in which the usual rate of change of the energy is measured [-].
 # _FASTER: smallest rate of change that shows a contact, relative to the usual rate of change before td [-].
 _OUTER, _LATEST, _FASTER = 0.1, 1 / 4, 2.0
-# Averaging time for the level of the energy, as a fraction of the time without load [-].
-# The level has changed once the mean energy leaves the range of the means before td, extended by its width both ways.
+# Averaging time for the energy level, as a fraction of the time without load [-].
+# The level has changed once the mean energy leaves the range of earlier means, extended by its width at both ends.
 _LEVEL: Final = 1 / 8
 # _KNOWN: fraction of the time before a possible landing that sets the energy range for comparison [-].
 # _TURNED: smallest number of energy extrema that are required in the time that sets this range.
 _KNOWN, _TURNED = 3 / 4, 4
 
 
-# Widening that makes the energy band of a flight's last quarter contain all energies of the flight [band widths].
+# Widening at which the energy band of the last quarter of a flight includes all energies of the flight [band widths].
 _RESERVE: Final = 0.5
 # Largest difference between the mean energies in the last two quarters of a flight, relative to the energy band [-].
 # A vibration with 3/4 of a period in each quarter changes the mean energies by 30 % of the band width.
 # A steady drift changes the mean energies of the two quarters by the band width.
 _DRIFT: Final = 0.35
-# A slow vibration swings through half of its energy range at least this often; a crash swings less often.
+# A slow vibration passes through half of its energy range at least this often; a crash does so less often.
 _SWINGS: Final = 4
 # Smallest energy range in each half of a flight with a slow vibration, as a fraction of the total range [-].
 _ALIKE: Final = 0.75
 # _TO_ZERO: largest minimum of the energy of a single vibration, relative to its peaks [-].
 # _HARDLY: largest oscillation of the energy that is ignored, relative to the plastic energy [-].
 _TO_ZERO, _HARDLY = 0.05, 1e-3
-# _FLAT: tolerance for the minimum and the later level of the energy of a yielding body, relative to its rise [-].
-# _MOST_FLAT: longest time for which the energy stays near its minimum, relative to its rise time [-].
+# _FLAT: a yielding body's minimum and later level may differ from zero and the peak by this fraction of the rise [-].
+# _MOST_FLAT: the energy stays near its minimum for at most this multiple of its rise time [-].
 # The energy of a harmonic motion stays near its minimum for 0.7 of its rise time.
 # The energy of a body that collides later stays near its minimum for longer.
 _FLAT, _MOST_FLAT = 0.1, 1.0
@@ -123,7 +123,7 @@ def _select_states(history: History, start: float, stop: int) -> slice:
 
 @remember
 def find_landing_after(history: History, start: float) -> float | None:
-    """Return the first time [time] after ``start`` at which the energy quickly leaves its former range; None if never.
+    """Return the first time [time] after ``start`` at which the energy quickly leaves its former range; otherwise None.
 
     The energy is compared with the first 3/4 of the time since ``start``, and must exceed their band by the band's
     width: no vibration goes so far beyond its range of so long a time.
@@ -151,7 +151,7 @@ def find_landing_after(history: History, start: float) -> float | None:
 
 
 def find_end_of_load(history: History, td: float) -> float | None:
-    """Return the end of the load [time], the last time before td at which the energy enters its band; None if unknown.
+    """Return the last time before td at which the energy enters its band, i.e. the end of the load [time].
 
     The band is that of the last quarter of the record before td, widened by a quarter of its width.  None if the energy
     was never above the band, so that nothing shows the end of a load, or if its last part leaves the band of the rest,
@@ -179,7 +179,7 @@ def find_end_of_load(history: History, td: float) -> float | None:
 
 
 def _find_last_excursion(history: History, states: slice) -> float | None:
-    """Return the last time in the given states at which the energy is far from its usual values; None if never."""
+    """Return the last time in the given states at which the energy is far from its usual values; otherwise None."""
     energy = history.energy[states]
     if energy.size < FEWEST:
         return None
@@ -209,21 +209,21 @@ def _compute_rates(history: History) -> Samples:
 
 
 def _find_burst(history: History, states: slice) -> float | None:
-    """Return the first time [time] after the given states at which the energy exceeds their band; None if never."""
+    """Return the first time [time] after the given states at which the energy exceeds its band; otherwise None."""
     top = _widen_band(history.energy[states], _BAND_RESERVE)[1]
     above = np.flatnonzero(history.energy[states.stop :] > top)
     return float(history.time[states.stop :][above[0]]) if above.size else None
 
 
 def _find_change_of_level(history: History, states: slice) -> float | None:
-    """Return the first time after the given states at which the mean energy leaves their band; None if never."""
+    """Return the first time [time] after the given states at which the mean energy leaves its band; otherwise None."""
     count = states.stop - states.start
     width = round(_LEVEL * count)
     if width < 1:
         return None
     sums = _sum_energies(history)[states.start :]
     means = (sums[width:] - sums[:-width]) / width
-    # The mean with the index ``count`` is the first one taken over later states only.
+    # The mean with the index ``count`` is the first mean that contains only later states.
     low, high = _widen_band(means[: count - width + 1], 1.0)
     outside = np.flatnonzero((means[count:] < low) | (means[count:] > high))
     if outside.size:
@@ -245,7 +245,7 @@ def _widen_band(values: Samples, share: float) -> tuple[float, float]:
 
 @remember
 def round_off(history: History) -> float:
-    """Return the energy below which an internal energy is only round-off of the largest energy in the run [energy]."""
+    """Return the energy up to which an internal energy is only round-off of the run's largest energy [energy]."""
     balance = history.balance
     terms: list[Samples | None] = []
     if balance:
@@ -255,7 +255,7 @@ def round_off(history: History) -> float:
 
 
 def find_largest(*terms: Samples | None) -> float:
-    """Return the largest absolute energy [energy]. Missing arrays are skipped; the result is 0 if all are missing."""
+    """Return the largest absolute energy [energy]. Missing arrays are skipped; if all are missing, return 0."""
     return max(
         (float(np.abs(term).max(initial=0.0)) for term in terms if term is not None),
         default=0.0,
@@ -366,7 +366,7 @@ def _sum_later_losses(damped: Samples) -> Samples:
 
 
 def _find_first_kept(energy: Samples, lost: Samples, least: float) -> int | None:
-    """Return the first state from which on an energy stays on the level of its last quarter; None if it drifts there.
+    """Return the first state after which an energy stays on the level of its last quarter; None if it drifts there.
 
     What damping still takes after each state, ``lost`` (n,), infinite if unknown, may lie above that level.
     """
@@ -407,7 +407,7 @@ def _has_slow_swings(energy: Samples, lost: Samples, least: float) -> bool:
 
 
 def _count_large_swings(energy: Samples, least: float) -> int:
-    """Count the extrema of an energy that follow changes of at least ``least``."""
+    """Count the energy extrema that follow a change of at least ``least``."""
     extrema = np.flatnonzero(np.diff(np.sign(np.diff(energy)))) + 1
     turns = 0
     low = energy[0]

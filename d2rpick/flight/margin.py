@@ -25,13 +25,13 @@ _FEWEST: Final = 3
 # A small position error can make a grazing contact, in which surfaces slide along each other, occur much earlier.
 # _GRAZING_FORCE: largest force of a grazing contact, relative to the largest force on the body [-].
 # _GRAZING_MOMENTUM: largest momentum change in a grazing contact, relative to the approach momentum [-].
-# A landing takes at least 25 % of the momentum in theory, and took at least 27 % in computed runs of cars and boxes.
+# A landing takes at least 25 % of the momentum in theory; in computed runs of cars and boxes, it took at least 27 %.
 # The grazing contact of a computed car took 2 % of the momentum.
 _GRAZING_FORCE, _GRAZING_MOMENTUM = 0.01, 0.1
 
 
 class Margin(NamedTuple):
-    """Time kept free before a contact [time], and its source.
+    """Time that is kept free before a contact [time], and the source of this time.
 
     ``source`` is "given", "flight" (3 % of the flight), "landing" (how far a switch may move the landing), "grazing"
     (the same for a grazing contact) or "no-contact".  ``spread`` is how far a switch may move the landing [time], None
@@ -97,7 +97,7 @@ def estimate_landing_spread(
     place: float | None,
     turning: float | None = None,
 ) -> float | None:
-    """Return how far a switch may shift the next landing [time], given its velocity error and its position error.
+    """Return by how much a switch may shift the next landing [time], from its velocity error and its position error.
 
     A body that is out of place by ``place`` [length] reaches the contact earlier by that distance over its speed
     towards the ground where it touches: the speed of its centre of mass and what its rotation adds, ``turning``
@@ -117,7 +117,7 @@ def estimate_landing_spread(
 def estimate_grazing_spread(
     history: History, flight: Flight, place: float | None
 ) -> float | None:
-    r"""Return how much earlier a grazing contact may occur [time]: infinite without gravity, None if unknown.
+    r"""Return how much earlier a grazing contact may occur [time]; infinite without gravity, None if unknown.
 
     If surfaces move along each other their closing speed is almost 0, and gravity g alone opens a gap of size e,
     ``place`` plus the amplitude of the vibration, in the time :math:`\sqrt{2 e / g}`.
@@ -138,7 +138,7 @@ def estimate_grazing_spread(
 
 
 class _Contact(NamedTuple):
-    """Momentum of a body, gravity, and the other forces on the body, at the times ``time`` of all states (n,).
+    """A body's momentum, gravity, and the other forces on the body, at the times ``time`` of all states (n,).
 
     ``begin`` is the last state before the contact that ends the flight.
     """
@@ -171,7 +171,7 @@ def _find_contact(history: History, flight: Flight) -> _Contact | None:
 
 
 def is_grazing(history: History, flight: Flight, within: float) -> bool:
-    """Return True if the contact that ends a flight stays below 1 % of the largest force for ``within`` [time].
+    """Return True if the contact that ends a flight stays below 1 % of the largest force for the time ``within``.
 
     False if the record ends before that, or momenta do not show the force.
     """
@@ -189,7 +189,7 @@ def is_grazing(history: History, flight: Flight, within: float) -> bool:
 
 
 def changes_momentum_little(history: History, flight: Flight) -> bool:
-    """Return True if the contact that ends a flight takes less than 10 % of the momentum towards it.
+    """Return True if the contact that ends a flight takes less than 10 % of the approach momentum.
 
     The contact is over when its force stays below 1 % of the largest one for three states.  The impulse is the change
     of momentum less gravity.  False if the record ends before that, or momenta do not show the force.
@@ -300,7 +300,7 @@ def compute_energy_of_approach(history: History, flight: Flight) -> float | None
 
 
 def _get_momentum_in_flight(history: History, flight: Flight) -> Samples | None:
-    """Return the momentum of the flying parts, shape (k, 3 or 1); None if it is unknown or other parts move as well."""
+    """Return the momentum of the flying parts, shape (k, 3 or 1); None if unknown or if other parts move as well."""
     momentum_of_body = select_momenta_of_flight(history, flight)
     if momentum_of_body is None:
         return None
@@ -317,7 +317,7 @@ def _get_momentum_in_flight(history: History, flight: Flight) -> Samples | None:
 def select_momenta_of_flight(
     history: History, flight: Flight
 ) -> tuple[Momenta, Sequence[int]] | None:
-    """Return the momenta that show the flying parts, and the columns of these parts; None if no momenta are written."""
+    """Return the momenta that show the flying parts, and these parts' columns; None if no momenta are written."""
     for momenta in history.momenta:
         if (momenta.parts is None) != (flight.parts is None):
             continue

@@ -37,22 +37,22 @@ if TYPE_CHECKING:
     from d2rpick.histories.run import OpenedRun
 
 
-# A larger set of parts is preferred if its window is at least this long, relative to that of a smaller set [-].
+# A larger set of parts is preferred if its window has at least this length, relative to that of a smaller set [-].
 # A part with a large momentum, such as a sled, increases the tolerance and the window lengths of all parts.
 _LONGER = 1.1
-# _LOOK_BACK: fraction of the record before td from which attached parts are determined [-].
-# _LOOK_STATES: largest number of states from which attached parts are determined.
-# _CANCELS: largest relative deviation from a straight line of the summed momenta of a body [-].
+# _LOOK_BACK: attached parts are determined from this fraction of the record, just before td [-].
+# _LOOK_STATES: attached parts are determined from at most this number of states.
+# _CANCELS: the summed momenta of a body deviate from a straight line by at most this fraction [-].
 _LOOK_BACK, _LOOK_STATES, _CANCELS = 0.1, 200, 1e-3
 # Largest relative decrease of the summed deviation that is treated as rounding error [-].
 # This limit prevents the search from endlessly adding and removing a part of almost no mass.
 _ROUNDED: Final = 1e-9
-# Largest final speed of parts at rest or held by a support, relative to their largest momentum [-].
+# Parts at rest or held by a support end with at most this fraction of their largest momentum [-].
 _HELD = 0.01
 # No part is missing if the part momenta add up to the momentum of the model within this relative error [-].
 _ALL_OF_IT: Final = 1e-2
 # _BY_ITSELF: shortest separate flight of a body that is considered, as a fraction of the record [-].
-# _OF_ITS_OWN: smallest relative velocity difference between a body that flies separately and the other parts [-].
+# _OF_ITS_OWN: a body flies separately if its velocity differs from that of the other parts by this fraction [-].
 _BY_ITSELF, _OF_ITS_OWN = 0.25, 0.05
 
 FLYING: Final = "flying"
@@ -128,7 +128,7 @@ def _collect_bodies_apart(momenta: Momenta, *members: int) -> tuple[int, ...]:
 
 
 def _search_bodies_apart(momenta: Momenta, members: Sequence[int]) -> Iterator[int]:
-    """Find the parts among ``members`` that fly separately, as `find_bodies_apart` defines them."""
+    """Find the parts among ``members`` that fly separately as defined in `find_bodies_apart`."""
     mass = momenta.mass(members)
     masses = momenta.masses
     if (
@@ -208,7 +208,7 @@ def find_flight_of(
     ):
         steady = VISIBLE * max(noise, float(np.ptp(inside, axis=0).max()))
         if gravity or float(np.abs(inside.mean(axis=0)).max()) <= steady:
-            return None  # The parts are held by supports, or they are at rest.
+            return None  # The parts are either held by supports or at rest.
     damping = laws.fit.damping(first, last) if gravity is not None else 0.0
     flight = FreeFlight.of(time, states, parts, damping=damping, gravity=gravity or 0.0)
     return limit_to_unheld(momenta.surroundings, flight, parts, td)
@@ -295,7 +295,7 @@ def _list_sets_to_try(momenta: Momenta, td: float) -> Iterator[tuple[int, ...]]:
 def _find_attached_parts(
     momenta: Momenta, chosen: Sequence[int], td: float
 ) -> tuple[int, ...]:
-    """Return the attached parts, with which the deviations of the momenta from straight lines before td cancel out.
+    """Return the attached parts, whose deviations of momentum from straight lines cancel out before td.
 
     Forces within a body that flies cancel: the sum of its parts' momenta is straight.  Such sums form the null space of
     the bent momenta, and its projector groups the parts of a body.
@@ -376,7 +376,7 @@ def replace_words_by_part_ids(run: OpenedRun, selection: Selection) -> Selection
 
 
 def list_deformable_parts(run: OpenedRun) -> tuple[Part, ...]:
-    """Return the parts that have internal energy at some time; raise FormatError if there are none."""
+    """Return the parts that have internal energy at any time; raise FormatError if there are none."""
     parts = run.parts
     energies = run.part_energies(
         parts
@@ -429,7 +429,7 @@ def find_parts_flying_together(run: OpenedRun) -> tuple[Part, ...]:
 
 
 def _list_cores(momenta: Momenta) -> Iterator[tuple[int, ...]]:
-    """Yield the sets of parts attached to the heaviest part at different times, without parts that slide at that time.
+    """Yield the sets of parts attached to the heaviest part at various times, without parts that slide at that time.
 
     A part that moves straight, such as a sliding loose wheel, bends no sum, and would otherwise pass for a part of the
     body.
@@ -449,7 +449,7 @@ def _list_cores(momenta: Momenta) -> Iterator[tuple[int, ...]]:
         )
         if (
             len(core) <= len(attached) and core not in sets
-        ):  # Each set is tried only once.
+        ):  # Each set of parts is tried only once.
             sets.add(core)
             yield core
 
@@ -462,7 +462,7 @@ def _is_sliding(momenta: Momenta, part: int, td: float) -> bool:
 
 
 def _get_parts_and_momenta(run: OpenedRun) -> tuple[tuple[Part, ...], Momenta | None]:
-    """Return the deformable parts and their momenta; None if the run has no part momenta."""
+    """Return the deformable parts and their momenta; None if the run contains no part momenta."""
     deformable = list_deformable_parts(run)
     return deformable, next(
         (candidate for candidate in run.momenta(deformable, None) if candidate.parts),
@@ -521,7 +521,7 @@ def find_complete_stretches(
 def is_complete(
     momenta: Momenta, whole: Momenta | None, before: float = 0.0
 ) -> NDArray[np.bool_]:
-    """Return True for each state at which the part momenta add up to the momentum of the whole model, shape (n,).
+    """Return an array that is True for each state in which the part momenta add up to the momentum of the whole model.
 
     ``before`` is the largest momentum of the whole model in earlier states.
     """

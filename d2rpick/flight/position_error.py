@@ -1,4 +1,4 @@
-"""Compute the position error of a body at td that results from freezing its moving parts in a different position.
+"""Compute by how much a body is misplaced at td because its moving parts were frozen in a different position.
 
 A part that moves against the rest, such as an engine on its mounts, is frozen where it is at tr.  The centre of mass
 flies as without switching, so the rest of the body is displaced by the part's fraction of the mass times the part's
@@ -38,21 +38,21 @@ if TYPE_CHECKING:
 
 # Largest number of states to which rotations are fitted. Displacements use all states.
 _STATES: Final = 200
-# A part whose relative velocity changes by no more than this fraction is not connected to the body [-].
-# The relative velocity of a connected part changes by more than this once the body has rotated by 0.01 degrees.
+# A part whose relative velocity changes by at most this fraction is treated as not connected to the body [-].
+# Once a body has rotated by 0.01 degrees, the relative velocity of its connected parts changes by more than this.
 _STEADY: Final = 1e-4
-# A position error is exact if the other parts deform by at most this fraction of the part's motion [-].
+# A position error is treated as exact if the other parts deform by at most this fraction of the part's motion [-].
 # In computed cars with correct position errors, the deformation was at most 0.24 of the part's motion.
 # In a public car model with position errors 3 to 4 times too small, this ratio was 1.1 to 1.4.
 _NOTABLE_DOUBT: Final = 1 / 3
-# Largest position error that is negligible even if underestimated, relative to the largest acceptable error [-].
+# A position error up to this fraction of the largest acceptable one is negligible even if it is underestimated [-].
 _HARDLY: Final = 0.01
 # Largest acceptable position error, relative to the path of the body [-]; it is 1/3 of the margin before a contact.
 MOST_OF_PATH: Final = 0.01
 
 
 class Drift:
-    """Displacement of a body during the flight, caused by parts that move relative to it. It changes from tr to td.
+    """Displacement of a body during the flight, caused by parts that move relative to the body between tr and td.
 
     Attributes
     ----------
@@ -140,7 +140,7 @@ class Drift:
         return np.degrees(self._inside(tr, td, turned))
 
     def _inside(self, tr: Samples, td: float, vectors: Samples) -> Samples:
-        """Return the length of each vector (k, 3), with NaN for times outside the flight."""
+        """Return the length of each vector (k, 3), or NaN for times outside the flight."""
         inside = (
             (tr >= self.time[0])
             & (tr <= self.time[-1])
@@ -159,7 +159,7 @@ def find_drift(
     placement: Placement | None = None,
     displacements: Displacements | None = None,
 ) -> Drift | None:
-    """Find how far a body in flight is displaced relative to the rigid body that replaces it.
+    """Find by how much a flying body is displaced from the rigid body that replaces it.
 
     The parts that move against the others are those without which the others are most nearly one rigid body turning at
     a constant rate; together they have at most half of the mass.
@@ -200,7 +200,7 @@ def find_drift(
         return None
     whole = float(
         np.nansum(masses[sorted({*seen.others, *members})])
-    )  # Parts with unknown positions are left out; otherwise the error would be too small.
+    )  # Parts with unknown positions are left out, because they would make the error too small.
     share = float(mass[moving].sum()) / whole
     doubt = share * float(
         np.sqrt(misfit / ((mass.sum() - mass[moving].sum()) * -(-time.size // stride)))
@@ -238,7 +238,7 @@ def integrate_displacements(
 def _compute_offsets(
     time: Samples, ways: Samples, mass: Samples, moving: Sequence[int], rate: Samples
 ) -> Samples:
-    """Return how far each moving part displaces the others if no other parts fly, shape (n, moving, 3) [length]."""
+    """Return how far each moving part displaces the others if nothing else flies, shape (n, moving, 3) [length]."""
     frame_parts = np.setdiff1d(np.arange(mass.size), moving)
     shares = mass[list(moving), np.newaxis] / mass.sum()
     against = (
@@ -269,7 +269,7 @@ def find_drift_in_flight(
 def find_parts_apart(
     history: History, flight: Flight, parts: Sequence[Part] | None = None
 ) -> tuple[Part, ...]:
-    """Return those of ``parts``, or of the parts to be switched, that separate from the others in the flight.
+    """Return those of ``parts`` (by default, of the parts to be switched) that separate from the others in the flight.
 
     The velocity of such a part against the others is constant; that of a part of a body vibrates and turns.
     """
@@ -329,7 +329,7 @@ def _collect_flying(
 
 
 class RigidBody(NamedTuple):
-    """Ids of the parts that become one rigid body; ``whole`` is False for a single part with disconnected pieces.
+    """Ids of the parts that become one rigid body; ``whole`` is False for a single part in disconnected pieces.
 
     No file shows how such pieces move against each other.
     """
@@ -358,7 +358,7 @@ class Off(NamedTuple):
 
     @property
     def part(self) -> str | None:
-        """Return the name of the part that is frozen in a different position; None if there is none."""
+        """Return the name of the part that is frozen in a different position; None if there is no such part."""
         return self.drift.part.name if self.error > 0 else None
 
 

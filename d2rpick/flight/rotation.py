@@ -21,12 +21,12 @@ if TYPE_CHECKING:
 
     Places = NDArray[np.intp]
 
-# Largest fraction of the displacements that an accepted rotation may leave unexplained [-].
+# An accepted rotation may leave at most this fraction of the displacements unexplained [-].
 _SHOWN: Final = 0.25
 # Largest number of Gauss-Newton steps; from a good start, a dozen steps reach full precision.
 _MOST_STEPS: Final = 25
 # _SMALL: step of the numerical derivative with respect to the angular velocity [revolutions per record].
-# _LEAST_GAIN: relative change of the angular velocity or the fit below which the iteration stops [-].
+# _LEAST_GAIN: the iteration stops once the angular velocity or the fit changes by less than this fraction [-].
 _SMALL: Final = 1e-6
 _LEAST_GAIN: Final = 1e-4
 # A sum of m r^2, about an axis or left unexplained, is treated as zero below this fraction of the full sum [-].
@@ -34,7 +34,7 @@ _VANISHING: Final = 1e-6
 # Numbers of periods per record that are tried as starting values for the harmonic motion.
 _PERIODS: Final = (*(n / 20 for n in range(4, 41)), *(2 * 1.1**n for n in range(1, 25)))
 
-# Number of parts that each of two criteria selects as candidates for the next moving part.
+# Number of candidates for the next moving part that each of two criteria selects.
 _TRIED: Final = 2
 # Omitting the next moving part must reduce the unexplained displacement to at most this fraction [-].
 _MORE_RIGID: Final = 0.5
@@ -255,7 +255,7 @@ def find_moving_parts(
 
 
 class _Apart(NamedTuple):
-    """Fit of a rigid rotation to all parts but one: the rotation, the misfit, and the effect of the omitted part."""
+    """Rigid rotation fitted to all parts but one: the rotation, the misfit, and the effect of the omitted part."""
 
     part: int
     rate: Samples
@@ -266,7 +266,7 @@ class _Apart(NamedTuple):
 def _find_next_moving_part(
     time: Samples, ways: Samples, mass: Samples, left: Places
 ) -> _Apart | None:
-    """Find the part without which the other parts move most nearly like a rigid body.
+    """Find the part whose omission leaves parts that move most nearly like a rigid body.
 
     If one part slides, all parts may seem to rotate.  Among parts that are equally good, the one with the largest
     effect is chosen.

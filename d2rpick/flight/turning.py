@@ -39,12 +39,12 @@ if TYPE_CHECKING:
 
 # Largest number of states in the integration; they suffice, because vibration hardly rotates a body.
 _STATES: Final = 2000
-# Inverse of the fraction of the flight over which the final angular velocity is averaged to remove vibration [-].
+# The final angular velocity is averaged over 1/_LAST of the flight, which removes vibration [-].
 _LAST: Final = 10
 
 
 class Turning(NamedTuple):
-    """Rotation of a body, from one integration over a flight: arrays over ``time`` (n,), in the frame of the body.
+    """Rotation of a body, integrated over a flight: arrays over ``time`` (n,), in the frame of the body.
 
     ``place`` (n, 3) is the body's displacement against the centre of mass of all flying parts, as far as the parts that
     become rigid cause it; ``arm`` (n, 3) leads from there to the points where errors are evaluated [length];
@@ -77,7 +77,7 @@ class Turning(NamedTuple):
         return float(np.cross(self.rate, front) @ direction)
 
     def errors_at_front(self, tr: Samples, direction: Samples) -> Samples:
-        """Return the position error, at the last time, of the node that is then farthest along a unit vector (3,).
+        """Return the position error at the last time for the node that is then farthest along a unit vector (3,).
 
         The body is rigid from ``tr`` (k,) to the last time; the result has shape (k,) [length].
         """
@@ -146,13 +146,13 @@ class _FlyingParts(NamedTuple):
     spreads: Samples
 
     def find_rows(self, columns: Sequence[int]) -> list[int]:
-        """Return the rows of these parts' arrays that belong to the given columns of the momenta."""
+        """Return the indices of these parts' array rows that belong to the given momentum columns."""
         rows = {column: row for row, column in enumerate(self.columns)}
         return [rows[column] for column in columns]
 
 
 class _BodyMotion(NamedTuple):
-    """Motion of the flying parts at times ``time`` (n,): the ``frame`` of the body, and ``places`` (n, parts, 3) in it.
+    """Motion of the flying parts at times ``time`` (n,): the body ``frame``, and the ``places`` (n, parts, 3) in it.
 
     The places are relative to the centre of mass of all that flies [length].
     """
@@ -163,7 +163,7 @@ class _BodyMotion(NamedTuple):
 
 
 class _Rotor(NamedTuple):
-    """The rotating parts in the frame of the body: ``inertia`` (n, 3, 3), and ``spin`` (n - 1, 3) between states.
+    """The rotating parts in the body frame: ``inertia`` (n, 3, 3), and ``spin`` (n - 1, 3) between states.
 
     The spin is the angular momentum in this frame, integrated over each step.
     """
@@ -178,7 +178,7 @@ def follow_turning(
     placement: Placement,
     displacements: Displacements | None = None,
 ) -> Turning | None:
-    """Follow the orientation of the body formed by the given parts, from the deck positions of all flying parts.
+    """Follow the orientation of the body that the given parts form, from the deck positions of all flying parts.
 
     ``moving`` are the columns of the parts that move against the others.  None if a mass or a place is unknown, or
     neither the parts of the body nor nodes whose ``displacements`` are written determine its orientation.
@@ -256,7 +256,7 @@ def _follow_parts(
     time = momenta.time[inside][::stride]
     travel = _integrate_velocities(momenta, flying.columns, masses)[inside][::stride]
 
-    # If the record begins with the run, the parts start at their positions in the deck and have moved by their travel.
+    # If the record begins with the run, the parts start at their deck positions and have moved by their travel.
     frame = None
     begins_with_run = momenta.time[0] <= momenta.time[1] - momenta.time[0]
     positions = flying.centres + travel
@@ -276,7 +276,7 @@ def _follow_parts(
 
 
 def _locate_flying_parts(seen: Flying, placement: Placement) -> _FlyingParts | None:
-    """Find the parts that have a mass in the deck; None if a mass is unknown or a part is not in the deck."""
+    """Find the parts that have a mass in the deck; None if a mass is unknown or the deck lacks a part."""
     momenta = seen.momenta
     assert momenta.parts is not None
     columns = sorted(
@@ -298,7 +298,7 @@ def _locate_flying_parts(seen: Flying, placement: Placement) -> _FlyingParts | N
 def _integrate_velocities(
     momenta: Momenta, members: Sequence[int], mass: Samples
 ) -> Samples:
-    """Return how far the parts in these columns have moved since the run began, shape (n, parts, 3) [length].
+    """Return how far the parts in these columns have moved since the start of the run, shape (n, parts, 3) [length].
 
     The velocity before the first state is the one of that state.
     """
@@ -368,7 +368,7 @@ def _solve_turning(
 
 
 def _integrate_matrix(time: Samples, slope: Samples) -> Samples:
-    """Return the solution (n, 3, 3) of X' = slope X that starts from the unit matrix."""
+    """Return the solution (n, 3, 3) of X' = slope X that starts from the identity matrix."""
     rotations = [np.eye(3)]
     unit = np.eye(3)
     for step in _take_middle_values(slope) * np.diff(time)[:, np.newaxis, np.newaxis]:

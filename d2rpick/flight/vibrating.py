@@ -52,7 +52,7 @@ def find_vibrating_parts(history: History, flight: Flight) -> Beside:
 
 
 def _list_parts_not_chosen(history: History, flight: Flight) -> tuple[Part, ...]:
-    """Return the parts that fly with the chosen ones but were not chosen, or those that a table names as left out."""
+    """Return the parts that fly with the chosen parts but were not chosen, or the parts that a table omits."""
     if history.parts is None:
         # A sum of several columns, or another column, may contain the energies of the parts that were left out.
         is_of_chosen = history.channel == CHOSEN_ENERGY

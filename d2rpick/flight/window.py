@@ -19,12 +19,12 @@ if TYPE_CHECKING:
 # Initial tolerance for deviations from free flight, relative to the range over the record [-].
 # A contact exceeds the initial tolerance at once.
 TOLERANCE = 1e-3
-# _TIGHTER: factor by which the tolerance is repeatedly reduced as long as the window keeps its length [-].
+# _TIGHTER: factor by which the tolerance is repeatedly reduced, as long as the window length hardly changes [-].
 # With a smaller tolerance, windows of other smooth motions shrink to less than half, but windows of flights do not.
 # _STAYS: a window that retains at least this fraction of its length is treated as unchanged [-].
-# _STANDS: largest shift of the other end of a window that shrinks at one end only, relative to the window [-].
+# _STANDS: if a window shrinks at one end only, its other end moves by at most this fraction of the window [-].
 _TIGHTER, _STAYS, _STANDS = 0.1, 0.95, 0.02
-# Smallest misfit of a vibration in the middle half of a window, relative to the misfit in the whole window [-].
+# A vibration has at least this fraction of its misfit in the middle half of a window [-].
 # For a smooth load, the misfit in the middle half of a window is 1/8 of that in the whole window.
 _RINGS = 1 / 3
 # SHORTEST: smallest duration of a flight, as a fraction of the record [-].
@@ -36,15 +36,15 @@ FEWEST_STATES_OF_WORK: Final = 6
 # _REACH_OF_DIGITS: factor by which a misfit due to printed digits may grow if the ends are included [-].
 # _REACH: factor by which any other misfit may grow if the ends are included [-].
 _ENDS, _REACH_OF_DIGITS, _REACH = 0.1, 1.5, 3.0
-# Relative resolution of all quantities [-]; solvers sum in single precision.
+# Relative resolution of all quantities [-], because solvers sum in single precision.
 ROUND_OFF = 1e-7
-# Largest relative change of a written value that is treated as rounding [-]; files have six to seven digits.
+# Relative changes of a written value up to this are treated as rounding [-], because files have six to seven digits.
 LAST_DIGIT: Final = 1e-6
-# Smallest momentum, energy or change of either that shows motion or work, relative to its rounding error [-].
+# Motion or work is visible if a momentum, an energy or its change exceeds this multiple of its rounding error [-].
 VISIBLE: Final = 100
-# Step in the list of start times that find all flights, for a search that only has to find long flights.
+# Step in the list of start times for the search for all flights, if only long flights have to be found.
 _FAR: Final = 5
-# Largest number of times that the ends of one window are cut off.
+# Largest number of times that the ends of a window are cut off.
 _MOST_SHRINKS = 8
 
 
@@ -91,7 +91,7 @@ class Law:
         self._misfits: dict[tuple[int, int], float] = {}
 
     def misfit(self, first: int, last: int) -> float:
-        """Return the largest deviation of states ``first`` to ``last``, in any order, from the best fit of the law."""
+        """Return the largest deviation of states ``first`` to ``last`` (in any order) from the best fit of the law."""
         window = min(first, last), max(first, last)
         if window not in self._misfits:
             self._misfits[window] = self._misfit(*window)
@@ -232,13 +232,13 @@ def _is_ringing(law: Law, window: tuple[int, int]) -> bool:
 
 
 def _is_fading(window: tuple[int, int], finer: tuple[int, int]) -> bool:
-    """Return True if a window shrinks only at the end with a fading load; the other end is a contact."""
+    """Return True if a window shrinks only at the end at which a load fades, and the other end is a contact."""
     moved = min(abs(finer[0] - window[0]), abs(finer[1] - window[1]))
     return moved <= _STANDS * (window[1] - window[0])
 
 
 def find_longest_window(law: Law, at: int, room: float) -> tuple[int, int]:
-    """Return the first and last state of the longest window around a state whose misfit is at most ``room``.
+    """Return the first and last state of the longest window around a state with a misfit of at most ``room``.
 
     Near an end of the flight, a short window may extend beyond the flight.  The window depends on the end that is
     moved first, so both orders are tried.
@@ -318,7 +318,7 @@ def _tighten_window(
 def _cut_off_hidden_push(
     law: Law, window: tuple[int, int], room: float
 ) -> tuple[int, int]:
-    """Cut off the ends of a window in which the tolerance ``room`` may hide the end of a push.
+    """Cut off the ends of a window if the tolerance ``room`` may hide the last part of a push in them.
 
     The deviation of a smoothly fading push falls with the square of its remaining time: from 4 times the room to the
     room takes as long as from there to its end.  Less than one state cannot be resolved.

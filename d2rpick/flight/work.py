@@ -29,23 +29,23 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Balance, Momenta, Samples
 
 
-# Relative error of the work of gravity, caused by sampling and by the solver's sums [-].
-# Contacts are found because they change the energies by more than this fraction of the work of gravity.
+# Relative error of the work of gravity, due to sampling and to sums formed by the solver [-].
+# A contact is found if it changes the energies by more than this fraction of the work of gravity [-].
 _OWN_ERROR: Final = 1e-3
 # If the work of gravity deviates from a parabola by at most this fraction, damping may be the reason [-].
 _BENT: Final = 1e-2
-# Smallest squared speed of states that are used to compute the mass, relative to the largest [-].
+# States are used to compute the mass if their squared speed is at least this fraction of the largest one [-].
 _SLOW: Final = 1e-2
 # Safety factor on the mass computed from kinetic energy and velocity [-].
 # That mass may be too small, because a table may contain the kinetic energy of only the chosen parts.
 # A load that does work like gravity without moving the model would need a much larger mass.
 _MASS_ERROR: Final = 2.0
-# Largest deviation that is treated as no work, relative to the range of the internal energy [-].
+# Work up to this fraction of the internal-energy range is treated as zero [-].
 _OF_INTERNAL: Final = 0.1
-# Error of a sum of energies minus the work of gravity, in relative rounding errors of one number [-].
+# Error of a sum of energies minus the work of gravity, as a multiple of the relative rounding error of a number [-].
 # Energies, momenta and the mass computed from them are all rounded.
 _OF_DIGITS: Final = 4
-# _LITTLE: largest relative loss of kinetic energy that is ignored [-].
+# _LITTLE: a relative loss of kinetic energy up to this is ignored [-].
 # _MUCH: a relative loss of kinetic energy of at least this is attributed to friction instead of damping [-].
 _LITTLE, _MUCH = 5e-3, 0.5
 
@@ -204,7 +204,7 @@ def has_laws(balance: Balance) -> bool:
 def compute_change_of_balance(
     balance: Balance, start: float, end: float
 ) -> float | None:
-    """Return the largest change of kinetic plus internal energy that gravity and damping do not explain [energy].
+    """Return the largest change of kinetic plus internal energy that gravity and damping leave unexplained [energy].
 
     Errors of digits are subtracted.  None if one of the energies is not written.
     """
@@ -277,7 +277,7 @@ def find_balanced_window(balance: Balance, td: float) -> FreeFlight | None:
 def list_damped_energies(
     balance: Balance, flight: FreeFlight, momenta: Momenta | None
 ) -> tuple[list[Samples], float]:
-    """Return the energies (n,) that only damping lowers in a flight, and their rounding error [energy].
+    """Return the energies (n,) that only damping reduces in a flight, and their rounding error [energy].
 
     The first is kinetic plus internal energy; the list is empty if a load of unknown size works on the model as well.
 
@@ -362,7 +362,7 @@ def is_taken_by_damping(
 
 
 def _classify_gravity(balance: Balance, first: int, last: int) -> float:
-    """Return the gravity in a window: 0 if the energies are constant or only damped, otherwise unknown.
+    """Return the gravity in a window: 0 if the energies are constant or only damped; otherwise unknown.
 
     NaN if energies are lost, by gravity, friction or damping: the loss by damping falls with the kinetic energy, which
     shows if much of it is gone.  Infinite if they grow, or lose more than the vibration has, and rather as a constant
@@ -399,7 +399,7 @@ def _classify_gravity(balance: Balance, first: int, last: int) -> float:
 
 
 def _list_terms(balance: Balance) -> list[Samples]:
-    """Return the written energies that only gravity and damping change in free flight."""
+    """Return those written energies that only gravity and damping change in free flight."""
     whole = balance.kinetic_and_internal
     internal = balance.internal
     changes = (
@@ -415,7 +415,7 @@ def _list_terms(balance: Balance) -> list[Samples]:
 
 
 class _Parabola(Law):
-    """Law that energies are parabolas over time, apart from damping, which removes a fraction of the kinetic energy.
+    """Law that energies are parabolas in time, apart from damping, which removes a fraction of the kinetic energy.
 
     Solvers compute velocities half a step away from positions, which adds the rate of the ``internal`` energy.
     """

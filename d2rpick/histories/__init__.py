@@ -1,1 +1,1 @@
-"""Read the files of a run into a History: their bytes, their contents, and the selected energy."""
+"""Read the files of a run into a History: the bytes of the files, their contents, and the selected energy."""

@@ -37,9 +37,9 @@ _QUANTITIES: Final[Mapping[str, str]] = {
     "eroded": "eroded_internal_energy",
     "damping": "damping_energy",
 }
-# Names that Abaqus uses for a total energy: the sum of all energies minus the external work, which is constant.
+# Names that Abaqus uses for a total energy, i.e. the sum of all energies minus the external work, which is constant.
 _LESS_WORK: Final = frozenset({"etotal", "allwk"})
-# The health of a run can be judged if the files contain at least one of these quantities.
+# The health of a run can be judged if its files contain at least one of these quantities.
 _JUDGED: Final = frozenset(_QUANTITIES.values()) - {
     "kinetic_energy",
     "frictional_contact_energy",
@@ -55,13 +55,13 @@ _VELOCITIES: Final = ("x_velocity", "y_velocity", "z_velocity")
 # Spring energies are recognised in solver files only, because in tables these names may have another meaning.
 _SPRINGS: Final = frozenset({"springenergy", "springanddamperenergy"})
 # Largest spring energy that is treated as zero, relative to the peak internal energy [-].
-# This limit corresponds to the six to seven significant digits of a glstat and of single precision.
+# This limit corresponds to six or seven significant digits, as in a glstat and in single precision.
 _NONE: Final = 1e-6
 # Largest spring energy that is treated as zero [energy]; LS-DYNA prints 1e-20 for zero.
 _FLOOR: Final = 1e-15
-# Largest deviation of the summed spring energies of the parts, relative to the peak [-]; matsum prints five digits.
+# Largest deviation of the sum of the parts' spring energies, relative to its peak [-]; matsum prints five digits.
 _ADDS_UP: Final = 1e-3
-# A part is included in the sum if its fitted factor is larger than this [-]; the ideal factors are 0 and 1.
+# A part is included in the sum if its fitted factor exceeds this [-]; the ideal factors are 0 and 1.
 _HALF: Final = 0.5
 
 
@@ -88,7 +88,7 @@ def read_balance(
 
 
 def read_terms(databases: Sequence[Legs]) -> Balance | None:
-    """Return the energy balance of the whole model, even if it is too incomplete to judge the run.
+    """Return the energy balance of the whole model, even if too much is missing to judge the run.
 
     The result is None if the files have no energy but the internal one, or if the columns are ambiguous.
     """
@@ -99,7 +99,7 @@ def read_terms(databases: Sequence[Legs]) -> Balance | None:
 
 
 def read_momentum(database: Legs) -> Momenta | None:
-    """Return the momentum of the model, or its velocity if the mass is unknown; None if the files contain neither."""
+    """Return the momentum of the model, or its velocity if the mass is unknown; None if neither is in the files."""
     has_components = not {*_MOMENTA, *_VELOCITIES}.isdisjoint(database.quantities)
     if not has_components and not _find_global_velocities(database):
         return None
@@ -186,7 +186,7 @@ class _Columns:
         self.momentum = False
 
     def mass(self, momenta: Samples) -> float:
-        """Return the mass of the model in the file; without it, the smallest mass that fits these momenta (n, 1, 3)."""
+        """Return the mass in the file or, failing that, the smallest mass that fits these momenta (n, 1, 3)."""
         written = self.quantity("mass")
         kinetic = self.quantity("kinetic_energy")
         if written is not None and written.size:
@@ -196,7 +196,7 @@ class _Columns:
         return float(compute_least_masses(momenta, kinetic[:, np.newaxis])[0])
 
     def quantity(self, quantity: str) -> Samples | None:
-        """Return the column that contains a given quantity of `d2rpick.histories.names.QUANTITIES`."""
+        """Return the column that contains a given quantity from `d2rpick.histories.names.QUANTITIES`."""
         name = self._database.quantities.get(quantity)
         return None if name is None else self._values(name)
 
@@ -248,7 +248,7 @@ class _Columns:
 
 
 def _stack_components(components: Sequence[Samples | None]) -> Samples | None:
-    """Stack components (n,) into vectors (n, 3); a missing component is 0. Return None if fewer than two exist."""
+    """Stack components (n,) into vectors (n, 3), with 0 for a missing component; None if there are fewer than two."""
     present = [component for component in components if component is not None]
     if len(present) < 2:
         return None
@@ -261,7 +261,7 @@ def _stack_components(components: Sequence[Samples | None]) -> Samples | None:
 def _read_hourglass_energies(
     databases: Sequence[Legs], parts: Sequence[Part], until: float
 ) -> tuple[tuple[Part, float, float], ...]:
-    """Return the highest hourglass energy and the highest internal energy of each part that has both in the files."""
+    """Return the highest hourglass energy and the highest internal energy of each part for which both are written."""
     ids = [part.id for part in parts]
     for database in databases:
         try:
@@ -281,7 +281,7 @@ def _read_hourglass_energies(
 
 
 def find_spring_energy(database: Legs) -> tuple[str, Samples] | None:
-    """Return the name and values (n,) of the spring and damper energy; None if it is zero or is the only energy."""
+    """Return the name and values (n,) of the spring and damper energy; None if it is zero or no other energy exists."""
     total = database.energy_channel
     if not READERS[database.format].solver or total is None:
         return None

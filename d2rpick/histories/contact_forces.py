@@ -20,13 +20,13 @@ if TYPE_CHECKING:
 
     Samples = NDArray[np.float64]
 
-# Largest force or impulse change that is treated as zero, relative to the largest value [-].
+# Forces and impulse changes up to this fraction of the largest value are treated as zero [-].
 # Single precision has seven digits, so forces below this fraction are rounding errors.
 _NOTHING: Final = 1e-6
 
 
 class ContactForce(NamedTuple):
-    """The force that the contact or rigid wall ``name`` exerts at the times ``time``, shape (n,) [time].
+    """The force that the contact or rigid wall ``name`` exerts at the times ``time`` [time], shape (n,).
 
     ``impulses`` of shape (n, 3) are those since the state before, 0 for the first state; NaN if unknown [momentum].
     ``acts`` (n,) is True if a force acts between a state and the one before.
@@ -96,7 +96,7 @@ def find_force(
 def join_contact_forces(
     pieces: Sequence[ContactForce], keep: NDArray[np.bool_]
 ) -> ContactForce:
-    """Join the forces of one contact from all restart segments of a run; ``keep`` marks the valid states.
+    """Join the forces of one contact from all restart segments of a run; ``keep`` is a mask of the valid states.
 
     Between two restart segments the force acts if it acts just before or after.
     """

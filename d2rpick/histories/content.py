@@ -32,9 +32,9 @@ if TYPE_CHECKING:
     Bytes = NDArray[np.uint8]
     Addresses = NDArray[np.int64]
 
-_HELD: Final = 1 << 24  # Largest size of a file that is kept in memory [bytes].
+_HELD: Final = 1 << 24  # Largest size of a file that is read into memory [bytes].
 _LINES: Final = 1 << 16  # Number of bytes in which line endings are counted at a time.
-# Number of bytes at each end of a file that are compared to recognise a file that has grown.
+# Number of bytes at each end of a file that are compared to check that a file has only grown.
 _END: Final = 1 << 12
 
 
@@ -70,7 +70,7 @@ class Content:
         return _gather_fields(self.view(0, len(self)), addresses, width)
 
     def fill_rows(self, room: Bytes, begin: int, stride: int, size_after: int) -> bytes:
-        """Fill the rows of ``room`` (n, width) with the bytes at ``begin`` and at steps of ``stride`` bytes after it.
+        """Fill the rows of ``room`` (n, width) with the bytes at ``begin`` and after each further ``stride`` bytes.
 
         Return the ``rest`` bytes after the last stride, fewer if the file ends before.
         """
@@ -86,7 +86,7 @@ class Content:
 
 
 def make_content(data: bytes | Content) -> Content:
-    """Return the content of bytes, which may be in memory or on disk."""
+    """Return the content of the given bytes, which may be in memory or on disk."""
     return Content(data) if isinstance(data, bytes) else data
 
 
@@ -103,12 +103,12 @@ class OnDisk(Content):
         State of the file when no write is pending.
     """
 
-    # Number of bytes that are read at a time for a large request.
+    # Number of bytes that are read at a time if a request is large.
     # The number is a power of two that fits into the processor cache.
     block = 1 << 19
-    # Largest gap between two fields that are read together [bytes]; skipping a larger gap is worth a system call.
+    # Largest gap between two fields that are read together [bytes]; for a larger gap, a second system call is faster.
     gap = 1 << 13
-    # Smallest number of bytes read at a time; the next request is usually for the bytes that follow.
+    # Smallest number of bytes that are read at a time, because the next request is usually for the bytes that follow.
     window = 1 << 16
 
     def __init__(self, name: str, file: int, state: FileState) -> None:
@@ -176,7 +176,7 @@ class OnDisk(Content):
         return data
 
     def fields(self, addresses: Addresses, width: int) -> Bytes:
-        """Return ``width`` bytes at each of n offsets, shape (n, width); they are valid only after a `check`."""
+        """Return ``width`` bytes at each of n offsets, shape (n, width). They are valid only after a `check`."""
         if np.any(addresses[1:] < addresses[:-1]):
             order = np.argsort(addresses, kind="stable")
             fields = np.empty((addresses.size, width), np.uint8)
@@ -185,7 +185,10 @@ class OnDisk(Content):
         return self._in_order(addresses, width)
 
     def _room(self, size: int) -> Bytes:
-        """Return an array of ``size`` bytes; small arrays share a buffer, as new memory costs more than reading."""
+        """Return an array of ``size`` bytes.
+
+        Small arrays share a buffer, because allocation would take longer than reading.
+        """
         if size > 2 * self.block:
             return np.empty(size, np.uint8)
         if not hasattr(self._own, "buffer"):
@@ -241,19 +244,19 @@ class OnDisk(Content):
             raise self._shortened()
 
     def _shortened(self) -> ChangedError:
-        """Return the error for a file that has become shorter."""
+        """Return the error for a file that has shrunk."""
         problem = f"{self._name}: the file was {self._size} bytes long and became shorter while it was read"
         return ChangedError(
             f"{problem}; is a solver writing it anew? Read it again when it has"
         )
 
     def check(self) -> None:
-        """Raise ChangedError unless all bytes read so far belong to one snapshot of the file."""
+        """Raise ChangedError unless all bytes that were read belong to one state of the file."""
         now = FileState.of(self._file)
         if now.is_as(self._state):
             return
         if now.size == self._size and now.modified != self._state.modified:
-            # A write may still be in progress, because it changes the modification time first and the size last.
+            # A write may still be in progress, because it changes the modification time first and the file size last.
             wait_for_settled_state(self._file, may_grow=True)
             now = FileState.of(self._file)
         if now.size < self._size:
@@ -278,7 +281,7 @@ class OnDisk(Content):
 
 
 class Scattered(OnDisk):
-    """The bytes of a file that is read at a few distant offsets.
+    """The content of a file that is read at a few distant offsets.
 
     The file is opened for each request, since a run may have written more such files than a process may have open.
     """
@@ -291,7 +294,7 @@ class Scattered(OnDisk):
 
     @cached_property
     def _own(self) -> local:  # type: ignore[override]  # a property overrides an attribute
-        """The window of the current thread; it is created on first use, because most files need no window."""
+        """The window of the current thread, which is created on first use because most files need no window."""
         from threading import local
 
         return local()
@@ -320,7 +323,7 @@ class Scattered(OnDisk):
             self._fill_from(file, room, begin)
 
     def fill_rows(self, room: Bytes, begin: int, stride: int, size_after: int) -> bytes:
-        """Fill the rows as `Content.fill_rows` does, but open the file only once."""
+        """Fill the rows as `Content.fill_rows` does, but open the file only once for all rows."""
         end = begin + len(room) * stride
         with FileIO(self._name) as file:
             for row, address in zip(room, range(begin, end, stride), strict=True):
@@ -330,7 +333,7 @@ class Scattered(OnDisk):
 
 
 def open_scattered(names: Sequence[str]) -> list[Scattered]:
-    """Return the contents of files that are read at a few offsets, once no write to them is in progress.
+    """Return the contents of files that are read at a few offsets, once no write to the files is in progress.
 
     Raises
     ------
@@ -342,7 +345,7 @@ def open_scattered(names: Sequence[str]) -> list[Scattered]:
 
 
 def open_content(name: str) -> bytes | OnDisk:
-    """Return the content of a file; a small file, or anything other than a regular file, is read into memory.
+    """Return the content of a file. A small file, or anything other than a regular file, is read into memory.
 
     Raises
     ------

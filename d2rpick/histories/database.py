@@ -35,19 +35,19 @@ if TYPE_CHECKING:
 
     Indices = NDArray[np.intp]
 
-# Time values may decrease at up to this fraction of the states [-]; columns other than the time exceed it.
+# In a time column, the values decrease at most at this fraction of the states [-]; other columns exceed it.
 _MOST_BACK: Final = 0.1
-# Significant digits, keyed by bytes per number: single precision has 7, and 17 digits preserve every double.
+# Significant digits by number of bytes per value: single precision has 7, and 17 digits preserve every double.
 DIGITS: Final = {4: 7, 8: 17}
 
-# An interval between states longer than this is a gap in the output, relative to the median interval [-].
+# An interval between states that exceeds this multiple of the median interval is a gap in the output [-].
 _LONG = 30.0
-# Number of states whose time steps are compared at a time; these states fit into the processor cache.
+# Number of states whose time steps are compared at a time, so that these states fit into the processor cache.
 _PIECE: Final = 1 << 15
-# Smallest fraction of the times in the coarser database that a database of the same run also contains [-].
-# A solver writes each database of a run at cycles of its own, even if their output intervals differ.
+# Of the times in the coarser database, at least this fraction must occur in another database of the same run [-].
+# A solver writes all databases of a run at its own cycles, even if the output intervals differ.
 _FEWEST = 0.5
-# Largest difference between the end times of databases of one run [output intervals]; a killed run lacks states.
+# Largest difference between the end times of a run's databases [output intervals]; a killed run may lack states.
 _ENDS_APART = 2.0
 # Tolerances by which the internal energy of the parts may exceed the energy of the model.
 # _MORE: tolerance relative to the largest energy of the model [-]; in solver files, less than 0.001 is needed.
@@ -159,16 +159,16 @@ class Database:
         return resolve_name(wanted, self.channels, self.source)
 
     def find_energy_unit(self, channel: str) -> str:
-        """Return the energy unit given in the name of a column; empty if the name contains none."""
+        """Return the energy unit that the name of a column contains; empty if it contains none."""
         return find_energy_unit(channel)
 
     def precisions(self, names: Sequence[str]) -> tuple[Precision, Precision]:  # noqa: ARG002  some subclasses use the argument
-        """Return the precision of the times and of these channels or, without channels, of the parts."""
+        """Return the precision of the times and of these channels or, if no channels are given, of the parts."""
         return Precision(self.digits), Precision(self.digits)
 
 
 class Legs:
-    """The restart segments of one run in order, as one `Database`; where two overlap, the newer segment is used.
+    """The restart segments of one run in order, as one `Database`. If two overlap, the newer segment is used.
 
     A single segment needs this too if a restart wrote states again, or if printed times are equal. Segments that have
     no states are used only if no segment has states.
@@ -232,7 +232,7 @@ class Legs:
             elif len(names) == 1:
                 channels[quantity] = names[0]
         for quantity, name in self._named:
-            # Another database of the run may have the quantity; if none has it, `open_run` raises the error.
+            # Another database of the run may have the quantity; if none does, `open_run` raises the error.
             with suppress(FormatError):
                 channels[quantity] = self.find(name)
         return channels
@@ -247,7 +247,7 @@ class Legs:
     @cached_property
     def notes(self) -> tuple[str, ...]:
         """Notes of the restart segments, and notes on states that were left out between them."""
-        # The columns are read first, because this may add notes to the restart segments.
+        # The columns are read first, because reading them may add notes to the restart segments.
         notes_on_states = self._kept[1] if self.channels else ()
         notes = [*self._own_notes]
         notes += [
@@ -285,7 +285,7 @@ class Legs:
         return self._legs[0].find(wanted)
 
     def find_energy_unit(self, channel: str) -> str:
-        """Return the energy unit given in the name of a column; empty if the name contains none."""
+        """Return the energy unit that the name of a column contains; empty if it contains none."""
         return self._legs[0].find_energy_unit(channel)
 
     def channel(self, name: str) -> Samples:
@@ -407,7 +407,7 @@ def _join_columns(columns: Sequence[Samples]) -> Samples:
 
 
 def _list_times(database: Database | Legs) -> list[Samples]:
-    """Return those times of the whole model and of the parts that the database contains."""
+    """Return the times that the database contains, of the whole model and of the parts."""
     return [
         *([database.time] if database.channels else []),
         *([database.part_time] if database.parts else []),
@@ -422,7 +422,7 @@ def _find_start(leg: Database) -> float:
 
 
 def _make_leg_key(leg: Database) -> tuple[float, list[tuple[str, int]]]:
-    """Return a key that sorts restart segments by start time and then by name, whatever the order of the arguments."""
+    """Return a key that sorts restart segments by start time and then by name, however they were ordered."""
     pieces = re.findall(r"(\D*)(\d*)", leg.source)
     return _find_start(leg), [(text, int(number or -1)) for text, number in pieces]
 
@@ -455,7 +455,7 @@ def _note_holes(time: Samples) -> tuple[str, ...]:
 
 
 def check_energy_of_parts(whole: Legs, holder: Legs, energies: Samples) -> None:
-    """Raise FormatError if the internal energy of the parts exceeds that of the whole model at the same times.
+    """Raise FormatError if the internal energy of the parts exceeds the energy of the whole model at the same times.
 
     ``energies`` are those of some parts of ``holder``, shape (n, parts) [energy].
     """
@@ -488,7 +488,7 @@ def check_energy_of_parts(whole: Legs, holder: Legs, energies: Samples) -> None:
 
 
 def note_doubts(databases: Sequence[Legs]) -> Iterator[str]:
-    """Yield a note on each pair of databases that have few printed times in common or different end times."""
+    """Yield a note on each pair of databases that share few printed times or have different end times."""
     for first, second in combinations(databases, 2):
         if not (first.span and second.span):
             continue
@@ -515,7 +515,7 @@ def note_doubts(databases: Sequence[Legs]) -> Iterator[str]:
 def _find_coincident(
     times: Samples, other_times: Samples, room: float
 ) -> tuple[Indices, Indices]:
-    """Return the indices of the times within ``room`` of another time, and of the other times nearest to them [time].
+    """Return the indices of the times that lie within ``room`` of another time, and of the nearest other times [time].
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Round and convert times as users read and type them: six digits and an optional unit."""
+"""Round and convert times as users read and type them, i.e. with six digits and an optional unit."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     Samples = NDArray[np.float64]
 
 _DIGITS: Final = 6  # Number of significant digits with which times are printed.
-# Number of significant digits of a sum of times; files have fewer digits, and a double has more.
+# Number of significant digits of a sum of times; times in files have fewer digits, and a double has more.
 _EXACT: Final = 12
 
 # Sizes of the time units, keyed by name [s], as strings because 0.001 has no exact double.
@@ -31,11 +31,11 @@ _TYPED_TIME: Final = (
     r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d{1,3})?)\s*([A-Za-zµμ]+)\s*"
 )
 
-# A time converted to ms or us is plausible at least this far from the record start, as a fraction of the record [-].
+# A time converted to ms or us is plausible if it is at least this fraction of the record after its start [-].
 _NEVER_MEANT: Final = 0.01
-# A converted time is suggested at least this far from the record start, as a fraction of the record [-].
+# A converted time is suggested only if it is at least this fraction of the record after its start [-].
 _HARDLY_MEANT: Final = 0.05
-# A td within this many first states is assumed to be in another unit, because such an early td would hardly save time.
+# A td within this number of first states is assumed to be in another unit, because it would hardly save time.
 # Only a record of 1000 or more states can contain both a td and 1000 times this td.
 _FIRST_STATES: Final = 10
 
@@ -52,7 +52,7 @@ def round_as_read(time: float) -> float:
 
 
 def round_to_first_as_read(time: float) -> float:
-    """Return the time rounded to six printed digits, or the time itself if it is earlier.
+    """Return the time rounded to six printed digits; if this is later than the time itself, return the time.
 
     Examples
     --------
@@ -97,7 +97,7 @@ def round_down_as_read(time: float) -> float:
 
 
 def format_window(start: float, end: float) -> str:
-    """Format a window such that its printed ends lie within it. A very short window is printed with all digits.
+    """Format a window so that its printed ends lie within it. A very short window is printed with all digits.
 
     Examples
     --------
@@ -164,7 +164,7 @@ def parse_seconds(text: str) -> Decimal | None:
 
 
 def convert_to_unit(text: str, unit: str) -> float | None:
-    """Convert a time with a unit to a number in another ``unit``; None if it is not a time or its unit is unknown.
+    """Convert a time with a unit to a number in another ``unit``; None for any other text or an unknown unit.
 
     Examples
     --------
@@ -185,7 +185,7 @@ def _find_next_printed(printed: float) -> float:
 
 
 def ask_for_smaller_unit(record: Samples, times: Sequence[float], argument: str) -> str:
-    """Return text that asks whether times of an argument outside a ``record`` (n,) were given in a smaller unit.
+    """Return text that asks whether an argument's times outside a ``record`` (n,) were given in a smaller unit.
 
     The question is empty if that does not explain the value.
 
@@ -222,7 +222,7 @@ def ask_for_larger_unit(
 def convert_to_unit_of_record(
     record: Samples, times: Sequence[float], unit: str = ""
 ) -> list[float]:
-    """Convert times among the first ten states of a ``record`` (n,) from seconds to the unit of the record, ms or us.
+    """Convert times among the first ten states of a ``record`` (n,) from seconds to the record's unit, ms or us.
 
     Return an empty list if neither 1000 times nor 1,000,000 times their value is a time of the record that a user may
     mean. ``unit`` is the unit of the record if its file names it. The start of the record is the same in any unit.
@@ -244,7 +244,7 @@ def convert_to_unit_of_record(
     ):
         return []
     earliest = min(early, first + _NEVER_MEANT * (last - first))
-    # The unit us comes first: if both units are possible, a value in ms would lie too early in the record.
+    # The unit us comes first, because a value in ms would lie too early in the record if both units are possible.
     for size in (1e6, 1e3):
         values = _scale_times(times, size)
         if earliest <= values[-1] <= last:
@@ -258,6 +258,6 @@ def _scale_times(times: Sequence[float], size: float) -> list[float]:
 
 
 def _ask_for_unit(unit: str, argument: str, values: Sequence[float]) -> str:
-    """Return text that asks whether an argument was meant in another unit, and shows the converted values."""
+    """Return text that asks whether an argument was given in another unit, and that shows the converted values."""
     numbers = " ".join(f"{value:g}" for value in values)
     return f"; was it meant in {unit}? Then give `{argument}` {numbers}, in the unit of the record"

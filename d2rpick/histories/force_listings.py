@@ -1,4 +1,4 @@
-"""Read the force-only ASCII databases of LS-DYNA: rcforc (contacts) and rwforc (rigid walls).
+"""Read the ASCII databases of LS-DYNA that contain only forces: rcforc (contacts) and rwforc (rigid walls).
 
 A line of rcforc is a side of a contact at a time: ``slave 1 time 0.1 x 0.0 y 0.0 z 0.0 mass 0.0``; newer releases
 call the sides SURFA and SURFB. A line of rwforc is the time, the number of a wall, its normal force and the force
@@ -42,7 +42,7 @@ _HEAD: Final = 1 << 16
 
 
 class _Rows(NamedTuple):
-    """The contents of all data lines: ids (n,), times (n,) and forces (n, 3)."""
+    """The content of all data lines: ids (n,), times (n,) and forces (n, 3)."""
 
     ids: Samples
     time: Samples
@@ -74,7 +74,7 @@ def read_listed_forces(sources: Sequence[Source]) -> tuple[ContactForce, ...]:
 
 
 def _join_legs(pieces: Sequence[ContactForce]) -> ContactForce:
-    """Join the restart segments of one contact; where two overlap, the newer segment is used."""
+    """Join the restart segments of one contact. If two overlap, the newer segment is used."""
     # Imported here to keep start-up fast.
     from d2rpick.histories.contact_forces import join_contact_forces
 
@@ -108,7 +108,7 @@ def _read_forces_of_file(source: Source) -> Iterator[ContactForce]:
 
 
 def _choose_largest_of_sides(time: Samples, forces: Samples) -> tuple[Samples, Samples]:
-    """Return, for each time, the line with the larger force; the force may be listed for one side only or for both."""
+    """Return, for each time, the line with the larger force, because a contact may be listed for one or both sides."""
     order = np.lexsort((np.abs(forces).sum(axis=1), time))
     last = np.append(np.diff(time[order]) > 0, True)
     return time[order][last], forces[order][last]
@@ -122,7 +122,7 @@ def _read_contact_rows(data: bytes) -> _Rows:
 
 
 def _read_wall_rows(data: bytes) -> _Rows:
-    """Read the data lines of an rwforc. If they lack components, the normal force is used as the first component."""
+    """Read the data lines of an rwforc. If they contain no components, the normal force is the first component."""
     lines = np.array(re.findall(_WALL_LINE, data), dtype="S32")
     numbers = lines.astype(np.float64).reshape(-1, 6)
     forces = numbers[:, 3:]

@@ -30,9 +30,9 @@ Record = TypeVar("Record", bound="History | Balance | Momenta")
 
 # Largest energy that is accepted [energy]; the squares of larger energies overflow a double.
 LARGEST_ENERGY: Final = 1e150
-# Largest speed of a part that is treated as at rest, relative to the fastest part [-]; rounding leaves such speeds.
+# Parts are treated as at rest up to this fraction of the speed of the fastest part [-]; rounding leaves such speeds.
 _STILL: Final = 1e-6
-# Number of times at which the energy is interpolated at once; it is small to keep the work arrays small.
+# Number of times at which the energy is interpolated in one step; it is small to keep the work arrays small.
 _TOGETHER: Final = 1 << 14
 
 
@@ -63,7 +63,7 @@ class Precision(NamedTuple):
         return float(10.0 ** (np.floor(np.log10(abs(value))) - self.digits + 1))
 
     def quanta(self, values: Samples) -> Samples:
-        """Return the distance between adjacent printable numbers near each of ``values``, in the same shape."""
+        """Return the distance between adjacent printable numbers near each of the ``values``, in the same shape."""
         if self.decimals is not None:
             return np.full(values.shape, 10.0**-self.decimals)
         sizes = np.abs(values)
@@ -75,7 +75,7 @@ class Precision(NamedTuple):
         return np.where(sizes > 0, 10.0**powers, 0.0)
 
     def noise(self, values: Samples) -> float:
-        """Return the rounding error of printed values, i.e. half of the last printed digit at the largest value."""
+        """Return the rounding error of printed values: half a unit of the last printed digit of the largest value."""
         return self.quantum(float(np.abs(values).max())) / 2
 
 
@@ -106,7 +106,7 @@ class Momenta:
     def choosing(
         self, chosen: tuple[int, ...], flying: tuple[int, ...] | None = None
     ) -> Momenta:
-        """Return the momenta with a different choice of parts to switch; results already computed are kept."""
+        """Return the momenta with another choice of parts to switch; results that were already computed are kept."""
         copy = replace(self, chosen=chosen, flying=flying)
         object.__setattr__(copy, "memory", self.memory)
         return copy
@@ -123,7 +123,7 @@ class Momenta:
         return sum(self.precision.quantum(value) for value in largest.tolist()) / 2
 
     def mass(self, members: Sequence[int]) -> float:
-        """Return the mass of those of the given parts that move [mass]; NaN if a mass is unknown."""
+        """Return the mass of those given parts that move [mass]; NaN if a mass is unknown."""
         if self.masses is None or self.velocity:
             return float("nan")
         largest = np.abs(np.stack(self._bounds)).max(axis=(0, 2))[list(members)]
@@ -134,7 +134,7 @@ class Momenta:
         return float(masses[~(speeds <= _STILL * speeds.max(initial=0.0))].sum())
 
     def change(self, members: Sequence[int]) -> float:
-        """Return the largest variation over the record among all momentum components of these parts [momentum]."""
+        """Return the largest variation of any momentum component of these parts over the record [momentum]."""
         lowest, highest = self._bounds
         return float((highest - lowest)[list(members)].max())
 
@@ -145,7 +145,7 @@ class Momenta:
 
     @cached_property
     def moving(self) -> tuple[int, ...]:
-        """Indices of the moving parts, i.e. those whose momentum components are not all the same constant number."""
+        """Indices of the moving parts: those with momentum components that vary or differ from each other."""
         lowest, highest = self._bounds
         return tuple(np.flatnonzero(highest.max(axis=1) > lowest.min(axis=1)).tolist())
 
@@ -178,7 +178,7 @@ def _sum_momenta(momenta: Momenta, *members: int) -> Samples:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Balance:
-    """Energies of the whole model at the times ``time``, shape (n,); None stands for an energy missing in the files.
+    """Energies of the whole model at the times ``time``, shape (n,). None stands for an energy that the files lack.
 
     ``sliding`` is the contact energy, ``friction`` its part from friction; ``damping`` and ``wall`` are dissipated by
     damping and at rigid walls. ``external_work`` is the work of all loads, ``total`` the total energy of the solver,
@@ -219,7 +219,7 @@ class Balance:
 
     @property
     def against_hourglassing(self) -> Samples | None:
-        """Hourglass energy, shape (n,), even if the internal energy includes it; None if it is unknown."""
+        """Hourglass energy, shape (n,), even if the internal energy contains it; None if it is unknown."""
         return self.artificial if self.hourglass is None else self.hourglass
 
     @cached_property
@@ -232,7 +232,7 @@ class Balance:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Given:
-    """Data other than the energy of the parts that show flights in a run.
+    """Data that show flights in a run, other than the energy of the parts.
 
     ``momenta`` are those of the parts, then of the whole model, as far as they are written. ``balance`` are the
     energies of the whole model; None if only the internal energy is written. ``masses`` are those of the parts with
@@ -335,7 +335,7 @@ class History:
 
     @property
     def masses(self) -> Samples | None:
-        """Masses of the parts with known momenta [mass], with NaN for an unknown mass; None if all are unknown."""
+        """Masses of the parts with known momenta [mass]; NaN for an unknown mass, None if all masses are unknown."""
         return self.evidence.masses
 
     @property
@@ -360,7 +360,7 @@ class History:
 
     @cached_property
     def step(self) -> float:
-        """Largest output interval [time], which limits the vibration frequencies that the record can resolve."""
+        """Largest output interval [time], which limits the vibration frequencies that the record resolves."""
         return float(np.max(np.diff(self.time)))
 
     @property
@@ -421,8 +421,8 @@ class History:
         )
 
     def check_unit(self, *times: float, argument: str) -> None:
-        """Raise RangeError if the times of an ``argument`` seem to be in a unit other than that of the record."""
-        # Usually no time lies below 1/1000 of the record, and no further check is needed.
+        """Raise RangeError if the times of an ``argument`` seem to have another unit than the record."""
+        # Usually, no time lies below 1/1000 of the record, and no further check is needed.
         if times[-1] * 1e3 > self.time[-1]:
             return
         from d2rpick.histories.digits import ask_for_larger_unit
@@ -438,7 +438,10 @@ class History:
             )
 
     def energy_at(self, time: float, argument: str = "") -> float:
-        """Return the energy at ``time``, interpolated linearly; a RangeError for other times names ``argument``."""
+        """Return the energy at ``time``, interpolated linearly.
+
+        A RangeError for a time outside names the ``argument``.
+        """
         self.check(time, argument=argument)
         index = max(int(np.searchsorted(self.time, time, side="right")) - 1, 0)
         # A slice is passed, because numpy would copy the complete read-only array.
@@ -475,7 +478,7 @@ class History:
 
 
 def list_columns(record: History | Balance | Momenta) -> dict[str, NDArray[Any]]:
-    """Return the arrays of a record that have one row per time, keyed by name; part masses have no such rows."""
+    """Return the arrays of a record that have one row per time, by name; this excludes the masses of parts."""
     columns: dict[str, NDArray[Any]] = {}
     for record_field in fields(record):
         values = getattr(record, record_field.name)
@@ -499,7 +502,7 @@ def select_states(
 
 
 def freeze(values: ArrayLike) -> Samples:
-    """Return values as a read-only array of doubles; an array that is already suitable is not copied."""
+    """Return values as a read-only array of doubles; an array that already has this form is not copied."""
     if (
         isinstance(values, np.ndarray)
         and values.dtype == np.float64

@@ -1,4 +1,4 @@
-"""Recognise and reject tables with one row per part and time, because they contain no single energy history."""
+"""Recognise and reject tables with a row for each part and time, because they contain no single energy history."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.history import Samples
 
-# Smallest energy variation between rows that shows several parts, relative to what noise explains [-].
+# Smallest energy variation between rows that indicates several parts, relative to what noise explains [-].
 # Without noise, a single energy varies as much from row to row as from time to time.
 # Noise multiplies the variation from row to row by at most the number of rows per time.
 _VARIES_MORE: Final = 3.0
@@ -22,7 +22,7 @@ _MOST_PARTS: Final = 1000
 
 
 def is_of_several_parts(time: Samples, energy: Samples) -> bool:
-    """Return True if an energy (n,) jumps between rows with equal times (n,), as energies of several parts do."""
+    """Return True if an energy (n,) jumps between rows of equal times (n,), as the energies of several parts do."""
     rows = count_rows_per_time(time)
     if rows == 1:
         return False
@@ -53,7 +53,7 @@ def find_part_column(columns: Mapping[str, Sequence[object]], rows: int) -> str 
 def refuse_rows_of_parts(
     source: str, time: Samples, energy: Samples, columns: Mapping[str, Sequence[object]]
 ) -> None:
-    """Raise FormatError if a table has one row per part and time.
+    """Raise FormatError if a table has a row for each part and time.
 
     Parameters
     ----------

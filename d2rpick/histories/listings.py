@@ -1,4 +1,4 @@
-"""Read the listings that solvers print, for the engine version, CPU times, and smallest time steps of the parts.
+"""Read listings of solvers for the engine version, CPU times, and the smallest time steps of parts.
 
 Sources: the published source of OpenRadioss (radioss_title.F, rbyonf.F, or_build_info.py), its pull request 4538 and
 its commit 780156a9a; ``CUMULATIVE CPU TIME SUMMARY`` of Radioss' engine listing (NAME_0001.out); the timing
@@ -32,18 +32,19 @@ _COMMIT: Final = rb"CommitID: *([0-9a-f]{7,40})\b"
 # Pattern of the copyright line, whose last year is the year in which the engine was built.
 _BUILT: Final = rb"COPYRIGHT \(C\) (?:\d{4}-)?(\d{4})"
 _RAN: Final = rb"EXECUTION (?:STARTED|COMPLETED) *[.:]+ *(\d{4})/(\d\d)/(\d\d)"
-# Date on which OpenRadioss corrected the energy of switched elements
+# Date on which OpenRadioss corrected the energy of switched elements.
 _FIXED: Final = (2026, 1, 13)
-# Commits from the weeks before OpenRadioss was corrected; an engine built from them may show the year 2026.
+# Hashes of the last commits before the correction; engines built from them may show the year 2026.
 _BEFORE: Final = (
     "49d9807 fe00fc0 ec1d512 76c61f5 52050b0 e28e42b 2b7ab50 6068aa2 0043df5 20f7b7f 0387857 c43d89c c36006f 670017c "
     "df5cc2b 047586b c3dff92 3844b9a 8751b9d f7fed09 cb26b37 062cdd8 e6f5601 ddf0b52 36f7b44 bcc1391 835210e 379fcb2 "
     "9e0e860 26e6573 0905ab7 96c6242 055fbad 9344188 cdf7934 49ecd10 eb51543 c2cb8fa 534623f 46f299a 8de64c8 43562a9 "
     "0260a03 d136353 7ca05a4 abdd714 0fd23b1 898ac63 9e2cfb1"
 )
-_SHORT: Final = 7  # Number of digits of an abbreviated commit hash
+_SHORT: Final = 7  # Number of digits of an abbreviated commit hash.
 
 WITH_AN_ERROR: Final = "with an error"
+_PACKED: Final = "normally: its history is packed"
 # Texts at the end of Radioss' engine listing and of LS-DYNA's messag and d3hsp.
 _ENDINGS: Final = {
     b"ERROR TERMINATION": WITH_AN_ERROR,
@@ -73,13 +74,13 @@ _STEP: Final = (
 )
 _TABLE: Final = rb"smallest timesteps *\r?\n[^\n]*\n[^\n]*part +timestep *\r?\n((?:[^\n]*\n)*?) *(?:\n|\Z)"
 _ROW: Final = rb"(?m)^ *[a-z][a-z ]* +\d+ +(\d+) +" + _STEP_NUMBER + rb"\s*$"
-# Number of bytes at the start of a file in which time steps are sought
+# Number of bytes at the start of a file that are searched for time steps.
 _SEARCHED: Final = 64 << 20
 _D3HSP: Final = "d3hsp"
 
 
 def find_wrong_energies(histories: Iterable[str]) -> Iterator[str]:
-    """Yield the listings of restarts whose engine reports a wrong internal energy, with the evidence.
+    """Yield the listings of restarts whose engine reports a wrong internal energy, each with the evidence.
 
     OpenRadioss before its fix of January 2026 reports a wrong energy of elements that /RBODY/ON or /RBODY/OFF of a
     restart switches. Nothing is yielded if the listing does not show when the engine was built.
@@ -94,12 +95,15 @@ def find_wrong_energies(histories: Iterable[str]) -> Iterator[str]:
 
 
 def find_ending(history: str) -> str | None:
-    """Return how a run ended, according to the listing next to its last history; None if it is unknown.
+    """Return how a run ended according to its last history and the listing next to it; None if it is unknown.
 
-    A restart segment that was told to stop has not ended the run, nor has one that another segment follows.
+    A packed history belongs to a run that has ended.  A restart segment that was told to stop has not ended the run,
+    nor has one that another segment follows.
     """
     from pathlib import Path  # Imported here to keep start-up fast.
 
+    if history.endswith(".gz"):
+        return _PACKED
     match = re.fullmatch(_HISTORY, history)
     if match is None:
         listings = [str(Path(history).parent / name) for name in ("messag", "d3hsp")]
@@ -134,7 +138,7 @@ def read_tail(path: str, size: int) -> bytes:
 
 
 def _detect_old_engine(head: bytes, tail: bytes) -> str:
-    """Return the evidence that an engine reports wrong energies after switching; empty if there is no evidence."""
+    """Return the evidence that an engine reports wrong energies after switching; empty if there is none."""
     if b"OpenRadioss" not in head or not re.search(_SWITCHED, head):
         return ""
     commit = re.search(_COMMIT, head)
@@ -159,7 +163,7 @@ class Timing(NamedTuple):
 
 
 class ZoneTimes(NamedTuple):
-    """CPU time per element and cycle [s], over the time of a run [time]; both have shape (n,)."""
+    """CPU time per element and cycle [s] at times of a run [time]; both have shape (n,)."""
 
     name: str
     time: Samples
@@ -187,7 +191,7 @@ def read_timing(path: str) -> Timing:
 
 
 def read_zone_times(path: str) -> ZoneTimes:
-    """Read the times per zone cycle from a glstat; raise FormatError if none of them is positive."""
+    """Read the times per zone cycle from a glstat; raise FormatError if none is positive."""
     pairs: list[tuple[float, float]] = []
     time = 0.0
     for line in re.finditer(_ZONE, _read_listing(path)):
@@ -221,7 +225,7 @@ def _read_listing(path: str) -> bytes:
 
 
 def find_radioss_timing(name: str, data: bytes) -> Timing | None:
-    """Return the CPU times in a Radioss listing, with 0 for a missing number; None if the listing has no summary."""
+    """Return the CPU times in a Radioss listing (0 for a missing number); None if the listing has no summary."""
     if _SUMMARY not in data:
         return None
     summary = data[data.rindex(_SUMMARY) :]
@@ -234,7 +238,10 @@ def find_radioss_timing(name: str, data: bytes) -> Timing | None:
 
 
 def _read_d3hsp_timing(name: str, data: bytes) -> Timing | None:
-    """Return the CPU times in a d3hsp without initialisation; elapsed times replace CPU times rounded to zero."""
+    """Return the CPU times in a d3hsp without initialisation.
+
+    If they are rounded to zero, elapsed times replace them.
+    """
     table = data[data.rindex(_TIMING) :]
     cycles = re.search(_D3HSP_CYCLES, table)
     total = re.search(_D3HSP_TOTAL, table)
@@ -274,7 +281,7 @@ def find_printed_steps(
 
 
 def _read_steps_of_glstat(run: OpenedRun) -> Iterator[tuple[str, int, float]]:
-    """Yield the part that controls the time step of each cycle, with the time step printed below it."""
+    """Yield the part that controls the time step in each cycle, with the time step printed below it."""
     for file in run.files:
         part: bytes | None = None
         for line in re.finditer(_STEP, file.data[:_SEARCHED]):
@@ -303,7 +310,7 @@ def _read_steps_of_d3hsp(names: Sequence[str]) -> Iterator[tuple[str, int, float
 
 
 def _parse_part_and_step(part: bytes, step: bytes) -> tuple[int, float]:
-    """Return the part id and the time step; a truncated time step gives 0."""
+    """Return the part id and the time step, which is 0 if it is truncated."""
     try:
         return int(part), float(step)
     except ValueError:

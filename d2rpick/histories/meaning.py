@@ -24,8 +24,8 @@ from d2rpick.histories.names import (
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping, Sequence
 
-# Ranks of the match between a column name and a quantity, from best to worst.
-# The rank depends on which words a name contains in addition to the quantity.
+# Ranks of how well a column name matches a quantity, from best to worst.
+# The rank depends on the words that a name contains in addition to the quantity.
 EXACT: Final = 0
 WHOLE_MODEL: Final = 1
 OF_SOMETHING_ELSE: Final = 2
@@ -43,7 +43,7 @@ _WHOLE_MODEL_WORDS: Final = frozenset(
 _ENERGY_WORDS: Final = frozenset(
     {"energy", "energies", "energie", "energien", "energia", "energias", "energi", "energii", "energiya", "en"}
 )  # fmt: skip
-# Words that may occur in the name of the time of the states, where "wall", "cpu" and "step" must not occur.
+# Words that may occur in the name of the time of the states, in contrast to "wall", "cpu" and "step".
 _TIME_WORDS: Final = frozenset(
     {"total", "simulation", "simulated", "sim", "analysis", "elapsed", "current", "physical", "solution", "whole"}
 )  # fmt: skip
@@ -51,7 +51,7 @@ _TIME_WORDS: Final = frozenset(
 _NUMBERING: Final = re.compile(r"(?i)^\s*(?:(?:curve|plot|line)\s*)?#?\d+\s*[.:)-]\s+")
 # Pattern of the name of a Radioss time history file, such as T01.
 _SOURCE: Final = re.compile(r"t\d\d")
-# Names of datasets whose group name gives the quantity, as in H5MD.
+# Names of datasets that hold the values of the quantity after which their group is named, as in H5MD.
 _UNNAMED_STEPS: Final = frozenset({"value", "values", "data", "res", "y"})
 # Names of datasets that are stored next to the values and contain no quantity.
 _STEPS_BESIDE: Final = frozenset({"step", "steps", "count", "error", "index", "cycle"})
@@ -62,7 +62,7 @@ _CAMEL_CASE: Final = re.compile(r"(?<=[a-zà-ÿ])(?=[A-Z])")
 _PLAIN_LETTERS: Final = str.maketrans(
     "àáâãäåçèéêëìíîïñòóôõöùúûüýÿąćęłńśźżčšžř", "aaaaaaceeeeiiiinooooouuuuyyacelnszzcszr"
 )
-_LONGEST_PHRASE: Final = 5  # Largest number of words in the name of a quantity
+_LONGEST_PHRASE: Final = 5  # Largest number of words in the name of a quantity.
 
 # Pattern of words that indicate a quantity other than internal energy. KE must be in capitals (unlike in "make").
 _OTHER_QUANTITY: Final = (
@@ -71,18 +71,18 @@ _OTHER_QUANTITY: Final = (
     r"|accel|veloc|displac|moment|force|pressure|stress|strain(?!.?en)|temperature|ratio|mass|time.?step)"
     r"|(?<![A-Z])KE(?![A-Z])"
 )
-# Normalised name of the rotational energy, which Radioss writes although the kinetic energy contains it.
+# Normalised name of the rotational energy, which Radioss writes although the kinetic energy includes it.
 ROTATION_ENERGY: Final = "rotationenergy"
 # Pattern of other energy names: Abaqus identifiers, and "energy" in other languages without spaces.
 _LIKE_AN_ENERGY: Final = (
     r"all[a-z]{2,3}|ke|ie|hge?|e?kin[a-z]*|.*(?:energ|エネルギー|能量|에너지).*"
 )
 
-_MOST_NAMED: Final = 6  # Largest number of energies named in a note
+_MOST_NAMED: Final = 6  # Largest number of energies that a note names.
 
 
 class Meaning(NamedTuple):
-    """The meaning of a name: a quantity, the rank of the match, and the words that denote something else."""
+    """The meaning of a name: a quantity, the rank of its match, and the words that denote something else."""
 
     quantity: str
     rank: int
@@ -101,7 +101,7 @@ _PHRASES: Final[Mapping[str, str]] = dict(_list_phrases())
 
 @lru_cache(maxsize=1 << 16)  # The same names are looked up repeatedly.
 def find_meaning(name: str) -> Meaning | None:
-    """Return the quantity that a name denotes, with the rank of the match; None if it denotes none, or several.
+    """Return the quantity that a name denotes, with the rank of the match; None if it denotes none or several.
 
     The name may be a path: its last step decides, if that means something.
 
@@ -118,7 +118,7 @@ def find_meaning(name: str) -> Meaning | None:
     while len(steps) > 1 and steps[-1].casefold() in _UNNAMED_STEPS:
         steps.pop()
     whole = _match_words(_split_words("/".join(steps)))
-    # The name contains a slash but is not a path, as in "total energy / initial energy".
+    # The name contains a slash but is not a path, e.g. "total energy / initial energy".
     if len(steps) == 1 or (whole and whole.quantity == "energy_ratio"):
         return whole
     if steps[-1].casefold() in _STEPS_BESIDE or is_time(steps[-1]):
@@ -155,7 +155,7 @@ def _match_words(words: Sequence[str]) -> Meaning | None:
 
 
 def _match_phrase(words: Sequence[str], start: int) -> int:
-    """Return the number of words of the longest phrase that begins at ``start``; 0 if there is none."""
+    """Return the number of words of the longest phrase that begins at ``start``; 0 if no phrase begins there."""
     longest = min(_LONGEST_PHRASE, len(words) - start)
     for length in range(longest, 0, -1):
         if "".join(words[start : start + length]) in _PHRASES:
@@ -197,7 +197,7 @@ def is_total_internal_energy(name: str) -> bool:
 
 
 def find_internal_energies(names: Sequence[str]) -> list[int]:
-    """Return the indices of names that denote exactly an internal energy, otherwise of all names that mention one.
+    """Return the indices of the names that denote exactly an internal energy or, failing that, that mention one.
 
     A total is not preferred to the energies of parts: only the user knows which energy is to be locked in.
     """
@@ -207,7 +207,7 @@ def find_internal_energies(names: Sequence[str]) -> list[int]:
         meaning = find_meaning(name)
         if meaning is None or meaning.quantity != "internal_energy":
             continue
-        # The name of a different quantity may contain these words, as "dissipated internal energy" does.
+        # The name of a different quantity may contain these words, e.g. "dissipated internal energy".
         is_other = re.search(_OTHER_QUANTITY, name)
         if meaning.rank == EXACT:
             exact.append(index)
@@ -231,7 +231,7 @@ def find_quantity(name: str) -> str | None:
 
 
 def find_quantities(names: Sequence[str]) -> dict[str, list[str]]:
-    """Return the names that best match each of `QUANTITIES`, keyed by quantity.
+    """Return the names that best match each of the `QUANTITIES`, by quantity.
 
     If the only internal energy belongs to something else, quantities of the same thing are used: it is the subject of
     the table. A column named "total" contains the total energy if there is a kinetic energy too.
@@ -264,7 +264,7 @@ def find_quantities(names: Sequence[str]) -> dict[str, list[str]]:
 
 
 def _find_subject(names: Sequence[str]) -> tuple[str, ...]:
-    """Return the words that name the owner of the only internal energy; empty if there is not exactly one energy."""
+    """Return the words that name the owner of the only internal energy; empty unless there is exactly one energy."""
     indices = find_internal_energies(names)
     meaning = find_meaning(names[indices[0]]) if len(indices) == 1 else None
     return meaning.others if meaning else ()
@@ -280,7 +280,7 @@ def _is_bare_total(name: str) -> bool:
 def note_unused_energies(
     channels: Sequence[str], used: Collection[str]
 ) -> tuple[str, ...]:
-    """Return a note on the channels that look like energies but are not ``used``; empty if there are none.
+    """Return a note on channels that look like energies but are not ``used``; empty if there are none.
 
     Examples
     --------
@@ -309,7 +309,7 @@ whole model, name it with `channel`, as in kinetic_energy=NAME",)
 
 def _has_name_of_energy(name: str) -> bool:
     """Return True if a name denotes an energy or work, or resembles such a name."""
-    # The kinetic energy contains the rotational energy.
+    # The kinetic energy includes the rotational energy.
     if normalise_name(name) == ROTATION_ENERGY:
         return False
     meaning = find_meaning(name)
@@ -345,7 +345,7 @@ def refuse_other_quantity(channel: str, where: str) -> None:
 
 
 def _find_word_of_other_quantity(channel: str) -> str:
-    """Return the word because of which a name does not denote internal energy; empty if there is none."""
+    """Return the word that shows that a name does not denote internal energy; empty if there is none."""
     meaning = find_meaning(channel)
     is_known = meaning is not None and meaning.rank < OF_SOMETHING_ELSE
     if meaning and meaning.quantity == "internal_energy" and is_known:

@@ -136,7 +136,7 @@ def check_energy_unit(unit: str) -> str:
 
 
 def remove_unit(name: str) -> str:
-    """Return a name without its unit and the word before the unit. Brackets that contain no unit are kept.
+    """Return a name without its unit and without the word before the unit. Brackets that contain no unit are kept.
 
     Examples
     --------
@@ -178,7 +178,7 @@ def is_unit(cell: str) -> bool:
 
 
 def match_names(wanted: str, names: Sequence[str]) -> list[int]:
-    """Return the indices of the names that match ``wanted`` exactly or, if none do, without case or unit."""
+    """Return the indices of the names that match ``wanted`` exactly or, if none do, apart from case and unit."""
     spellings: tuple[Callable[[str], str], ...] = (
         str.strip,
         lambda text: text.strip().casefold(),
@@ -196,7 +196,7 @@ def match_names(wanted: str, names: Sequence[str]) -> list[int]:
 
 
 def resolve_name(wanted: str, names: Sequence[str], where: str) -> str:
-    """Return the only matching name; raise FormatError, with similar names, if no name or several names match.
+    """Return the only matching name. If no name or several names match, raise a FormatError with similar names.
 
     Examples
     --------
@@ -252,7 +252,7 @@ def clean_text(raw: bytes) -> str:
 
 
 def number_in_family(name: str, first: str) -> int | None:
-    """Return the number that a file name appends to the name of the first file in its family; None if there is none.
+    """Return the number that a file name appends to the name of its family's first file; None if it appends none.
 
     Examples
     --------
@@ -272,12 +272,12 @@ class Part(NamedTuple):
 
     @property
     def name(self) -> str:
-        """Title of the part, or its number if it has no title."""
+        """Title of the part; if it has no title, its number."""
         return self.title or f"part {self.id}"
 
 
 class Namesake(Part):
-    """A part whose title is not unique; its name therefore contains its number."""
+    """A part whose title is not unique, so that its name contains its number."""
 
     __slots__ = ()
 

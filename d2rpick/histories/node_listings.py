@@ -1,4 +1,4 @@
-"""Find the motion of nodes in a run, possibly in LS-DYNA's ASCII database nodout, which this module reads.
+"""Find the motion of nodes in a run, which may be in LS-DYNA's ASCII database nodout; this module reads it.
 
 A state begins with ``n o d a l   p r i n t   o u t   f o r   t i m e  s t e p`` and its time. A line is the number of a
 node and its displacements, velocities, accelerations and coordinates; rotations follow in a block of their own. A state
@@ -39,7 +39,7 @@ def recognises(head: bytes) -> bool:
 def find_motion(
     databases: Sequence[Legs], listings: Sequence[Source], wanted: set[int]
 ) -> NodeMotion | None:
-    """Return the motion of wanted nodes from the first source that contains any of them.
+    """Return the motion of the wanted nodes from the first source that contains any of them.
 
     None if neither the databases of a run nor its listings of nodes contain them, or if their records are damaged.
     """
@@ -63,7 +63,7 @@ def _read_database(database: Legs, wanted: set[int]) -> NodeMotion | None:
 def read_listed_nodes(
     sources: Sequence[Source], wanted: Collection[int]
 ) -> NodeMotion | None:
-    """Return the motion of the wanted nodes that all files contain; the files are restart segments of one run.
+    """Return the motion of the wanted nodes that all files, the restart segments of one run, contain.
 
     Raises
     ------

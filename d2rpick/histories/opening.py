@@ -1,4 +1,4 @@
-"""Open a run: find the reader of each file by the content of the file."""
+"""Open a run: find the reader of each file by the file content."""
 
 from __future__ import annotations
 
@@ -43,21 +43,21 @@ _HEAD = 8192
 _DEFAULT = Selection()
 # Largest length of the legend in an ASCII database [bytes].
 _LONGEST_LEGEND: Final = 1 << 24
-# Largest number of unused tables named in a note.
+# Largest number of unused tables that a note names.
 _MOST_TABLES: Final = 3
 # Words that LS-DYNA prints above the states in a nodout.
 _NODOUT: Final = b"n o d a l   p r i n t   o u t"
 # Characters at the end of the name of a later file in a family.
 _DIGITS: Final = "0123456789"
 
-# Largest difference between the energies of two restart segments at a common time, relative to the largest energy [-].
+# At a common time, energies of two restart segments differ by at most this fraction of the largest energy [-].
 _SAME = 0.01
 # Number of parts whose energies are compared to recognise restart segments of different runs.
 _COMPARED = 50
 
 
 class Reader(Protocol):
-    """The functions that each reader module defines; the module of a table format also defines ``write``."""
+    """The functions that each reader module defines. The module of a table format also defines ``write``."""
 
     def recognises(self, head: bytes) -> bool:
         """Return True if a file with these first bytes has the format of the reader. This function never raises."""
@@ -69,7 +69,7 @@ class Reader(Protocol):
 
 
 def load_reader(kind: str) -> Reader:
-    """Import the reader of a format, given by its key in `READERS`."""
+    """Import the reader of a format, given its key in `READERS`."""
     return cast(
         "Reader", import_module(f"d2rpick.histories.formats.{READERS[kind].module}")
     )
@@ -78,7 +78,7 @@ def load_reader(kind: str) -> Reader:
 def open_run(
     names: Sequence[str], selection: Selection = _DEFAULT, input_format: str = "auto"
 ) -> OpenedRun:
-    """Open the files of one run; files of one format are its restart segments, other files are companion files.
+    """Open the files of one run. Files of one format are its restart segments, other files are companion files.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ def open_run(
 
 
 def _note_unused_tables(names: Sequence[str]) -> tuple[str, ...]:
-    """Return a note on energy tables in named folders, which are not read next to solver databases."""
+    """Return a note on energy tables in the named folders, which are not read next to solver databases."""
     tables = [table for name in names for table in list_tables_of_folder(name)]
     if not tables:
         return ()
@@ -197,7 +197,7 @@ def _reopen(
 def _sort_by_format(
     sources: Sequence[Source], input_format: str
 ) -> tuple[dict[str, list[Source]], list[str]]:
-    """Group the files of a run by format; also return notes on files that match a pattern but are not used.
+    """Group the files of a run by format, and return notes on files that match a pattern but are not used.
 
     Of a pattern, as of a folder, the energy histories are used; a table only if there is no database of a solver. The
     later files of a family have the format of its first file.
@@ -257,23 +257,23 @@ def _note_left_out_file(source: Source, refusal: str) -> str:
 def _sort_forces_last(
     opened: Mapping[str, Sequence[Database]], ordered: Sequence[str]
 ) -> list[str]:
-    """Return the formats, those with only forces last; raise FormatError if all formats contain only forces."""
+    """Return the formats, with those that contain only forces last; raise FormatError if all contain only forces."""
     alone = {kind: all(leg.only_forces for leg in opened[kind]) for kind in ordered}
     if all(alone.values()):
-        # Reading the branch raises the error with the best message about missing data.
+        # Reading the branch raises the error with the best message about the missing data.
         opened[ordered[0]][0].branch("glstat")
     return sorted(ordered, key=alone.__getitem__)
 
 
 def _is_force_listing(source: Source) -> bool:
-    """Return True if a file is a force listing; a file of a family never is."""
+    """Return True if a file is a force listing, which is never part of a family."""
     return not isinstance(source.data, Scattered) and force_listings.recognises(
         source.data[:_HEAD]
     )
 
 
 def _is_node_listing(source: Source) -> bool:
-    """Return True if a file is a node listing; a file of a family never is."""
+    """Return True if a file is a node listing, which is never part of a family."""
     if isinstance(source.data, Scattered) or _NODOUT not in _head_of(source):
         return False
     # Imported here to keep start-up fast.
@@ -285,7 +285,7 @@ def _is_node_listing(source: Source) -> bool:
 def _read_force_listings(
     sources: Sequence[Source],
 ) -> tuple[tuple[ContactForce, ...], tuple[str, ...]]:
-    """Read the forces in files without energies, or return a note if the forces cannot be read."""
+    """Read the forces in files without energies; if the forces cannot be read, return a note."""
     try:
         return force_listings.read_listed_forces(sources), ()
     except FormatError as error:
@@ -326,7 +326,7 @@ def _open_legs_of_formats(
 
 
 def _has_model_and_parts(legs: Sequence[Database]) -> bool:
-    """Return True if databases contain histories both of the whole model and of its parts."""
+    """Return True if databases contain histories of both the whole model and its parts."""
     return any(leg.channels for leg in legs) and any(leg.parts for leg in legs)
 
 
@@ -338,7 +338,7 @@ def _refuse_unknown_channels(databases: Sequence[Legs], selection: Selection) ->
 
 
 def _refuse_time_of_solver(kinds: Sequence[str], time: str | None) -> None:
-    """Raise FormatError if ``--time`` would be ignored, because solver files have only one time, named 'time'."""
+    """Raise FormatError if ``--time`` would be ignored, because solver files contain only one time, named 'time'."""
     if (
         time is not None
         and time.strip().casefold() != "time"
@@ -398,7 +398,7 @@ def _head_of(source: Source) -> bytes:
 
 
 def check_companions(databases: Sequence[Legs]) -> None:
-    """Raise FormatError if two databases have no time in common."""
+    """Raise FormatError if two databases have no common times."""
     for first, second in combinations(databases, 2):
         if not first.span or not second.span:
             continue
@@ -486,7 +486,7 @@ def _find_shared_states(
 
 
 def _is_same_energy(first: Samples, second: Samples) -> bool:
-    """Return True if energies differ no more than after a restart on other processors; NaN values are ignored."""
+    """Return True if energies differ by no more than after a restart on other processors; NaN values are ignored."""
     if first.shape != second.shape:
         return True
     are_finite = np.isfinite(first) & np.isfinite(second)

@@ -22,13 +22,13 @@ class ResumePoint(NamedTuple):
     end: int
 
     def read_on(self, name: str) -> bytes:
-        """Return the header of a file and its bytes after ``begin``; raise OSError if they cannot be read."""
+        """Return the header of a file and its bytes after ``begin``; raise OSError if it cannot be read."""
         with open(name, "rb") as stream:  # noqa: PTH123  pathlib would slow down start-up
             stream.seek(self.begin)
             return self.head + stream.read()
 
     def locate(self, point: ResumePoint) -> ResumePoint:
-        """Convert a resume point in the bytes returned by `read_on` to a resume point in the file."""
+        """Convert a resume point in the bytes that `read_on` returned to a resume point in the file."""
         skipped = self.begin - len(self.head)
         return ResumePoint(point.head, point.begin + skipped, point.end + skipped)
 
@@ -36,7 +36,7 @@ class ResumePoint(NamedTuple):
 def join_resume_points(
     points_of_files: Iterable[Mapping[str, ResumePoint]],
 ) -> dict[str, ResumePoint]:
-    """Return the resume points of several files, by file name; empty if a file is always read completely."""
+    """Return the resume points of several files by file name; empty for a file that is always read completely."""
     joined: dict[str, ResumePoint] = {}
     for points in points_of_files:
         if not points:

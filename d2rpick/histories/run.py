@@ -57,7 +57,7 @@ NO_STATES: Final = "no states; did the run reach its first output?"
 
 
 class OpenedRun:
-    """The databases of one run, one per format, from most to least comprehensive.
+    """The databases of one run, one per format, with the most comprehensive first.
 
     ``sources`` are the names of the files, ``files`` their contents. ``surroundings`` are the forces from outside.
     ``reopen`` opens the same files again with other surroundings, which is how a run is copied to another process.
@@ -126,7 +126,7 @@ class OpenedRun:
         return tuple(dict.fromkeys([*notes, *note_doubts(self.databases)]))
 
     def history(self, selection: Selection) -> History:
-        """Return the history of the selected energy: of parts, of channels, or by default of the whole model.
+        """Return the history of the selected energy: that of parts, of channels, or by default of the whole model.
 
         Raises FormatError, with what there is, if something selected is missing.
         """
@@ -192,7 +192,7 @@ class OpenedRun:
             )
         )
         if values is None or not values.size:
-            # A database that lacks some momenta cannot show which parts fly together.
+            # A database without some of the momenta cannot show which parts fly together.
             return None
         precision = holder.precisions(())[1]
         masses = self._least_masses(values, holder)
@@ -236,7 +236,10 @@ class OpenedRun:
         return np.where(massless, 0.0, ratios)
 
     def _least_masses(self, momenta: Samples, holder: Legs) -> Samples | None:
-        """Return the part masses; an unknown mass is set to the smallest that fits its momentum and kinetic energy."""
+        """Return the part masses.
+
+        An unknown mass is set to the smallest one that fits its momentum and kinetic energy.
+        """
         from d2rpick.histories.balance import compute_least_masses
 
         masses = self._masses(momenta, holder)
@@ -293,7 +296,7 @@ class OpenedRun:
 
     @cached_property
     def springs(self) -> tuple[Part, ...]:
-        """Parts that are springs or dampers, judging by their energies."""
+        """Parts that, judging by their energies, are springs or dampers."""
         from d2rpick.histories.balance import find_springs
 
         parts = self.parts
@@ -327,7 +330,7 @@ class OpenedRun:
         return columns
 
     def centre(self, parts: Sequence[Part]) -> Track | None:
-        """Return the mean position of the centres of the given parts [length]; None if the files do not contain it."""
+        """Return the mean position of the centres of the given parts [length]; None if they are not in the files."""
         components = give_if_written(
             lambda: [self._of_holder(axis, parts).mean(axis=1) for axis in _CENTRES]
         )
@@ -340,7 +343,7 @@ class OpenedRun:
         return self._holder().part_channel(quantity, [part.id for part in parts])
 
     def _energy(self, selection: Selection) -> History:
-        """Return the history of the selected energy only, without any other data that show flights."""
+        """Return the history of the selected energy without any other data that show flights."""
         if all(database.span is None for database in self.databases):
             raise FormatError(f"{self.name}: {NO_STATES}")
         if selection.parts:
@@ -376,13 +379,13 @@ class OpenedRun:
     def _of_parts(
         self, chosen: tuple[Part, ...], springs: tuple[Part, ...] = ()
     ) -> History:
-        """Return the history of the summed part energies; springs are added only if no other part has energy."""
+        """Return the history of the summed energies of parts. Springs are added only if no other part has energy."""
         holder = self._holder()
         energies = self.part_energies(chosen)
         for database in self.databases:
             check_energy_of_parts(database, holder, energies)
         left_out = np.array([part in springs for part in chosen])
-        # Springs are not left out if no other part has energy.
+        # Springs are included if no other part has energy.
         if not energies[:, ~left_out].any():
             left_out[:] = False
         idle = [
@@ -408,7 +411,7 @@ class OpenedRun:
         return replace(history, springs=tuple(compress(chosen, left_out)))
 
     def _without_springs(self, database: Legs, channel: str) -> History:
-        """Return the history of the model without spring and damper energy, unless there is no other energy."""
+        """Return the history of the model without spring and damper energy, unless no other energy exists."""
         from d2rpick.histories.balance import find_spring_energy
 
         whole = self._of_channels((channel,))
@@ -472,7 +475,7 @@ class OpenedRun:
         self, database: Legs, time: Samples, energy: Samples, channel: str, names: Sequence[str],
         notes: tuple[str, ...], parts: tuple[Part, ...] | None,
     ) -> History:  # fmt: skip
-        """Return the history of an energy (n,) with the names and precisions of its database."""
+        """Return the history of an energy (n,), with the names and precisions of its database."""
         time_precision, energy_precision = database.precisions(names)
         return History(
             time=time,
@@ -493,7 +496,7 @@ class OpenedRun:
 
 
 def _find_common_energy_unit(database: Legs, names: Sequence[str]) -> str:
-    """Return the energy unit common to all these channels; empty if a channel has no unit, or if units differ."""
+    """Return the energy unit that all these channels share; empty if a channel has no unit or units differ."""
     units = {database.find_energy_unit(name) for name in names}
     return units.pop() if len(units) == 1 else ""
 
@@ -564,7 +567,7 @@ class _Written(Given):
 
 
 def _list_energy_channels(database: Legs, selection: Selection) -> list[str]:
-    """Return the channels used as the energy, and all other channels that contain an internal energy."""
+    """Return the channels that are used as the energy, and all other channels with an internal energy."""
     if selection.energy:
         passed_over = filter(is_any_internal_energy, database.channels)
         return [*(database.find(name) for name in selection.energy), *passed_over]
@@ -572,7 +575,7 @@ def _list_energy_channels(database: Legs, selection: Selection) -> list[str]:
 
 
 def _compute_median_of_nonzero(values: Samples) -> Samples:
-    """Return the median of each column of values (n, k) over the states in which this column is not 0.
+    """Return the median of each column of values (n, k) over the states in which the column is not 0.
 
     The mass of a rigid part is 0 in some states.
     """

@@ -1,4 +1,4 @@
-"""Compute with sampled curves: valid states, integrals, level crossings, turning points, outlines, roots."""
+"""Compute with sampled curves: valid states, integrals, level crossings, turning points, outlines and roots."""
 
 from __future__ import annotations
 
@@ -16,16 +16,19 @@ if TYPE_CHECKING:
 
     Samples = NDArray[np.float64]
 
-# Smallest fraction of states that repeat the previous time in a table with one row per part and time [-].
+# A table has a row for each part and time if at least this fraction of its states repeat the previous time [-].
 _REPEATED: Final = 0.49
-# Smallest number of times examined; in fewer rows, equal times may be a coincidence.
+# Smallest number of times that are examined, because equal times in fewer rows may be a coincidence.
 FEWEST_TIMES: Final = 3
-# Largest ratio of the output intervals before and after a restart [-]; unsorted tables and other curves exceed it.
+# Largest ratio of the output intervals before and after a restart [-]; unsorted tables and curves exceed it.
 _ALIKE = 2.0
-# Number of adjacent windows that are combined into one window on the next level of the search table.
+# Number of adjacent windows that form one window on the next level of the search table.
 _TOGETHER: Final = 8
-# Largest relative change of the time of a converged root [-]; it is about the rounding error.
+# A root has converged if its time changes by at most this fraction [-], which is about the rounding error.
 _STILL: Final = 8 * float(np.finfo(np.float64).eps)
+# Number of halvings of a bracket that are tested together if there are few brackets.
+_HALVED_TOGETHER: Final = 5
+_FEW: Final = 100  # Largest number of brackets that count as few.
 HALVINGS: Final = 50  # Number of bisections that narrow a bracket to rounding error
 
 
@@ -42,7 +45,7 @@ def find_window(time: Samples, start: float, end: float) -> slice:
 
 
 def get_ends(time: Samples) -> tuple[float, ...]:
-    """Return the first and last of the times (n,), which identify a window of a record; empty if there are no times."""
+    """Return the first and last of the times (n,), which identify a window of a record; empty without times."""
     return (*time[:1].tolist(), *time[-1:].tolist())
 
 
@@ -63,7 +66,7 @@ def integrate_by_trapezia(time: Samples, values: Samples) -> Samples:
 
 
 def compute_median(values: Samples) -> Samples:
-    """Return the median of values (n,) or (n, k) over the first axis, without numpy's slow import of masked arrays.
+    """Return the median of values (n,) or (n, k) over the first axis without importing numpy.ma, which is slow.
 
     Examples
     --------
@@ -82,7 +85,7 @@ def remove_line(time: Samples, values: Samples) -> Samples:
     >>> remove_line(np.array([0.0, 1.0, 2.0]), np.array([[1.0, 0.0], [2.0, 3.0], [3.0, 0.0]])).round(12).tolist()
     [[0.0, -1.0], [0.0, 2.0], [0.0, -1.0]]
     """
-    # The sum is used instead of mean(), which is slow for a few values.
+    # The sum is used instead of mean(), which is slow for only a few values.
     t = time - time.sum() / time.size
     centred = values - values.sum(axis=0) / time.size
     columns = centred.T
@@ -157,7 +160,7 @@ def count_rows_per_time(time: Samples) -> int:
 
 
 def check_one_run(time: Samples, place: Callable[[int], str]) -> Samples:
-    """Return times (n,) unchanged; raise FormatError, with the place of the state, if they belong to several runs."""
+    """Return times (n,) unchanged; if they belong to several runs, raise a FormatError with the place of the state."""
     state = _find_wrong_step_back(time)
     if state is None:
         return time
@@ -174,7 +177,7 @@ def check_one_run(time: Samples, place: Callable[[int], str]) -> Samples:
 
 
 def _find_wrong_step_back(time: Samples) -> int | None:
-    """Return the first state at which times (n,) step back without a restart that explains this; None if there is none.
+    """Return the first state at which times (n,) step back without being explained by a restart; otherwise None.
 
     One step back is a restart if it does not go back to the start, and if the interval after it (the first one and
     the median) is half to twice the median interval before it.
@@ -200,7 +203,7 @@ def _find_wrong_step_back(time: Samples) -> int | None:
 
 
 def _compute_median_step(steps: Samples) -> float:
-    """Return the median time step, ignoring steps between equal printed times; NaN if there are no other steps."""
+    """Return the median time step, ignoring steps between equal printed times; NaN if no other steps exist."""
     steps = steps[steps > 0]
     return float(compute_median(steps)) if steps.size else np.nan
 
@@ -208,7 +211,7 @@ def _compute_median_step(steps: Samples) -> float:
 def find_crossings(
     time: Samples, energy: Samples, level: float
 ) -> tuple[Samples, NDArray[np.bool_]]:
-    """Return the times (k,) at which ``energy`` crosses ``level``, ascending, and a mask (k,) of the rising crossings.
+    """Return the times (k,) at which ``energy`` crosses ``level``, ascending, and a mask (k,) of rising crossings.
 
     Between samples the energy is linear: for piecewise linear data the result is exact to rounding. The energy
     crosses the level if it is on different sides before and after:
@@ -237,7 +240,7 @@ def find_crossings(
     turn = np.flatnonzero(np.diff(side[off_level]))
     index_before = off_level[turn]
     index_after = off_level[turn + 1]
-    # If several samples lie on the level, the crossing is at the first of them.
+    # If several samples lie on the level, the first of them is the crossing.
     share = np.where(
         index_after == index_before + 1,
         (level - energy[index_before])
@@ -272,7 +275,7 @@ def find_turns(energy: Samples) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
 
 
 def _compare_sides(values: Samples, limits: Samples | float) -> NDArray[np.int8]:
-    """Return 1 where values (n,) are above the limits, -1 where they are below, and 0 elsewhere, as 1-byte integers."""
+    """Return 1 where values (n,) exceed the limits, -1 where they are below, and 0 elsewhere, as 1-byte integers."""
     return np.asarray((values > limits).view(np.int8) - (values < limits).view(np.int8))
 
 
@@ -324,7 +327,7 @@ def find_first_above(
 
 
 def merge_times(*times: Samples) -> Samples:
-    """Return the distinct times in ascending order. numpy.unique is not used, because it imports numpy.ma.
+    """Return the distinct times in ascending order without numpy.unique, which imports numpy.ma.
 
     Examples
     --------
@@ -361,6 +364,56 @@ def draw_outline(time: Samples, values: Samples, stretches: int) -> Samples:
     return np.stack([time[at], values[at]])
 
 
+def halve_brackets(
+    passes: Callable[[Samples], NDArray[np.bool_]],
+    within: Samples,
+    beyond: Samples,
+    halvings: int,
+) -> Samples:
+    """Halve the brackets around the times at which a test changes its result; return their ends ``within``.
+
+    Several halvings of a few brackets are tested at once, because few times cost as much as one time. The result is
+    that of single halvings.
+
+    Parameters
+    ----------
+    passes : callable
+        True at ``within`` and False at ``beyond``, for arrays of their shape with a further first axis.
+    within, beyond : array
+        Ends of the brackets, in either order.
+    halvings : int
+        Number of halvings.
+
+    Examples
+    --------
+    >>> float(halve_brackets(lambda t: t <= 0.7, np.array(0.0), np.array(1.0), 3))
+    0.625
+    """
+    while halvings:
+        together = min(halvings, _HALVED_TOGETHER if within.size <= _FEW else 1)
+        times = np.stack([within, beyond])
+        for _ in range(together):
+            times = _insert_middles(times)
+        passed = passes(times)
+        end = np.zeros((1, *within.shape), np.intp)
+        for level in reversed(range(together)):
+            middle = end + 2**level
+            end = np.where(np.take_along_axis(passed, middle, 0), middle, end)
+        within, beyond = (
+            np.take_along_axis(times, index, 0)[0] for index in (end, end + 1)
+        )
+        halvings -= together
+    return within
+
+
+def _insert_middles(times: Samples) -> Samples:
+    """Insert the middle between neighbours along the first axis, shape (n, ...) to (2 n - 1, ...)."""
+    denser = np.empty((2 * len(times) - 1, *times.shape[1:]))
+    denser[::2] = times
+    denser[1::2] = (times[1:] + times[:-1]) / 2
+    return denser
+
+
 class Roots(NamedTuple):
     """The narrowed brackets: the end ``within`` on the positive side, the other end ``beyond``, and the root ``at``."""
 
@@ -370,11 +423,9 @@ class Roots(NamedTuple):
 
 
 def narrow_brackets(
-    inside: Callable[[Samples], Samples | NDArray[np.bool_]],
+    inside: Callable[[Samples], tuple[Samples, Samples]],
     within: Samples,
     beyond: Samples,
-    *,
-    slope: Callable[[Samples], Samples] | None = None,
     steps: int = HALVINGS,
 ) -> Roots:
     """Narrow the brackets around the roots at which ``inside`` changes from positive to non-positive.
@@ -382,39 +433,35 @@ def narrow_brackets(
     Parameters
     ----------
     inside : callable
-        Positive at ``within`` and not at ``beyond``, an array for an array; it may return booleans.
+        Returns values and their slopes, arrays for an array; the values are positive at ``within`` and not at
+        ``beyond``.  Newton steps are used if they stay within their bracket, and each root stays once it has converged,
+        so that it does not depend on the other roots searched with it.
     within, beyond : array
         Ends of the brackets, in either order.
-    slope : callable, optional
-        Derivative of a smooth ``inside``: Newton steps are used if they stay within their bracket, and each root stays
-        once it has converged, so that it does not depend on the other roots searched with it.
     steps : int
         Largest number of steps.
-        At most.
 
     Examples
     --------
-    >>> found = narrow_brackets(lambda t: 2 - t**2, np.array([0.0]), np.array([2.0]), slope=lambda t: -2 * t)
+    >>> found = narrow_brackets(lambda t: (2 - t**2, -2 * t), np.array([0.0]), np.array([2.0]))
     >>> f"{found.at[0]:.12f}"
     '1.414213562373'
     """
     at = (within + beyond) / 2
     still = np.zeros(np.shape(within), dtype=bool)
     for _ in range(steps):
-        value = inside(at)
+        value, slope = inside(at)
         good = value > 0
         within = np.where(good, at, within)
         beyond = np.where(good, beyond, at)
         following = (within + beyond) / 2
-        if slope is not None:
-            rise = slope(at)
-            newton = at - value / np.where(rise == 0, np.inf, rise)
-            inner = (newton >= np.minimum(within, beyond)) & (
-                newton <= np.maximum(within, beyond)
-            )
-            following = np.where(inner, newton, following)
-            following = np.where(still, at, following)
-            still |= np.abs(following - at) <= _STILL * np.abs(at)
+        newton = at - value / np.where(slope == 0, np.inf, slope)
+        inner = (newton >= np.minimum(within, beyond)) & (
+            newton <= np.maximum(within, beyond)
+        )
+        following = np.where(inner, newton, following)
+        following = np.where(still, at, following)
+        still |= np.abs(following - at) <= _STILL * np.abs(at)
         at = following
         if still.all():
             break

@@ -23,24 +23,24 @@ if TYPE_CHECKING:
 
 # Pattern of the file names of LS-DYNA's d3 families: job name, family name, file number.
 _FAMILY: Final = r"(?i:(?P<first>(?:.*\.)?d3(?:plot|thdt|part))(?P<number>\d{2,})?)"
-# Pattern of the file names of force listings, which are read together with files that contain energies.
+# Pattern of the file names of force listings, which are read in addition to files that contain energies.
 _FORCES: Final = r"(?i:r[cw]forc(?:\.gz)?)"
 _GZIP = b"\x1f\x8b"
 # Number of packed bytes that are unpacked at a time; they unpack to at most 68 MB.
 _BLOCK = 1 << 16
-# Smallest similarity of a suggested file name [-]; it is high, because equal suffixes make names similar.
+# Smallest similarity of a suggested file name [-]; it is high, because equal suffixes alone make names similar.
 _LIKENESS = 0.8
 _NUMBER = r"\d+\.?\d*|\.\d+"
-# A table whose first bytes contain this word is probably an energy history.
+# A table with this word in its first bytes is probably an energy history.
 _ENERGY_IN_HEAD: Final = b"energy"
 _HEAD_OF_TABLE: Final = 4096
 
-# Pattern of a file name with or without the number of a restart segment (runT01, binout0001).
+# Pattern of a file name with or without the number of a restart segment (e.g. runT01, binout0001).
 _NUMBERED: Final = re.compile(r"(.*?)(\d*)(\.gz)?", re.DOTALL)
 
 
 class Source(NamedTuple):
-    """The unpacked bytes of one file, in memory or on disk, under the name that the user gave for the file.
+    """The unpacked bytes of one file, in memory or on disk, under the file name that the user gave.
 
     ``cut`` is True if packed data ends early: ``data`` is what could be unpacked of ``packed``. ``by_pattern`` is
     True if a pattern or folder matched the file, rather than its name.
@@ -53,7 +53,7 @@ class Source(NamedTuple):
     by_pattern: bool = False
 
     def sha256(self) -> str:
-        """Return the SHA-256 of the bytes as read, before unpacking.
+        """Return the SHA-256 of the bytes as they were read, before unpacking.
 
         Raises ChangedError if a large file was rewritten since.
         """
@@ -66,7 +66,7 @@ class Source(NamedTuple):
 
 
 def expand(names: Sequence[str]) -> tuple[str, ...]:
-    """Replace folders and patterns by the files that they contain or match, otherwise keeping the order.
+    """Replace folders and patterns by the files that they contain or match, and keep the order of all others.
 
     Of a folder only databases of solvers are used, and they must belong to one run.
 
@@ -79,7 +79,7 @@ def expand(names: Sequence[str]) -> tuple[str, ...]:
 
 
 def open_files(names: Sequence[str]) -> list[Source]:
-    """Read the files of one run, which `expand` finds and `open_source` opens.
+    """Read the files of one run that `expand` finds and `open_source` opens.
 
     Raises
     ------
@@ -111,7 +111,7 @@ def open_files(names: Sequence[str]) -> list[Source]:
 
 
 def _open_families(names: Sequence[str]) -> dict[str, Source]:
-    """Open the files whose names show that they belong to families; only small parts of these files are read."""
+    """Open the files whose names show that they belong to families, of which only small parts are read."""
     family = re.compile(_FAMILY)
     in_families = [name for name in names if family.fullmatch(os.path.basename(name))]  # noqa: PTH119  pathlib would slow down start-up
     try:
@@ -129,7 +129,7 @@ def _open_families(names: Sequence[str]) -> dict[str, Source]:
 
 
 def _look_at_state(name: str) -> FileState | None:
-    """Return the state of a file; None if it is not a regular file."""
+    """Return the status of a file; None if it is not a regular file."""
     try:
         status = os.stat(name)  # noqa: PTH116  pathlib would slow down start-up
     except (OSError, ValueError):
@@ -160,7 +160,7 @@ def _report_empty(name: str) -> FormatError:
 
 
 def _list_files(name: str) -> Sequence[str]:
-    """Return the files that a name stands for: a file and its family, all in a folder, or all that match a pattern."""
+    """Return the files that a name stands for: a file with its family, the files of a folder, or those of a pattern."""
     # os.path is used instead of pathlib to keep start-up fast.
     if name == STDIN or os.path.isfile(name):  # noqa: PTH113  pathlib would slow down start-up
         return [name, *_list_later_files(name)]
@@ -189,7 +189,7 @@ def _is_pattern(name: str) -> bool:
 
 
 def _list_later_files(name: str) -> Sequence[str]:
-    """Return the later files of a family in ascending order; the name of its first file stands for all of them."""
+    """Return the later files of a family in ascending order, given the name of its first file."""
     folder, first = os.path.split(name)
     match = re.fullmatch(_FAMILY, first)
     if match is None or match["number"]:
@@ -212,7 +212,7 @@ _DECKS: Final = (".k", ".key", ".dyn", ".rad")
 
 
 def _list_databases(folder: Path) -> list[str]:
-    """Return the solver databases in a folder; raise FormatError unless they all belong to one run."""
+    """Return the solver databases in a folder; raise FormatError unless all belong to one run."""
     runs_of_files = {file: _find_run(file) for file in sorted(folder.iterdir())}
     databases = {file: run for file, run in runs_of_files.items() if run}
     if not databases:
@@ -256,7 +256,7 @@ def _read_head(file: Path) -> bytes:
 
 
 def _find_run(file: Path) -> str:
-    """Return the run name in the file name of a solver database; empty for any other file."""
+    """Return the run name that the file name of a solver database contains; empty for any other file."""
     if re.fullmatch(_FORCES, file.name) and file.is_file():
         return "one of LS-DYNA"
     for listed in READERS.values():
@@ -289,7 +289,7 @@ def _read_file(name: str) -> bytes | OnDisk:
     except (
         OSError,
         ValueError,
-    ) as error:  # A name with a NUL character raises ValueError.
+    ) as error:  # A name with a NUL character raises a ValueError.
         raise _report_unread(name, error) from None
 
 
@@ -306,7 +306,7 @@ def _report_unread(name: str, error: OSError | ValueError) -> FormatError:
 
 
 def _suggest_file(name: str) -> str:
-    """Return a question that suggests a similar file in the folder, or a hint if the name is a time, or ""."""
+    """Return a question that suggests a similar file in the folder, a hint if the name is a time, or ""."""
     seconds = parse_seconds(name)
     if seconds is not None or re.fullmatch(_NUMBER, name):
         value = "" if seconds is None else f", {seconds:g} if that unit is s"
@@ -325,7 +325,7 @@ def _suggest_file(name: str) -> str:
 
 
 def _unpack(name: str, packed: bytes | OnDisk) -> Source:
-    """Unpack as much of gzip data as is complete, within the limits on memory."""
+    """Unpack gzip data as far as they are complete, within the limits on memory."""
     import zlib
 
     data = bytes(packed)
@@ -372,7 +372,7 @@ def _unpack_pieces(
 
 
 def find_later_legs(names: Sequence[str]) -> list[str]:
-    """Return the later restart segments that lie next to these files and that the user did not name."""
+    """Return the later restart segments next to these files that the user did not name."""
     from pathlib import Path  # Imported here to keep start-up fast.
 
     legs: list[str] = []
@@ -392,7 +392,7 @@ def find_later_legs(names: Sequence[str]) -> list[str]:
 
 
 def _split_leg_number(name: str) -> tuple[str, int]:
-    """Split a file name into its stem and the number of its restart segment, which is 0 if there is none."""
+    """Split a file name into its stem and the number of its restart segment (0 if there is none)."""
     match = _NUMBERED.fullmatch(name)
     # The match is never None, because the pattern matches any text.
     assert match is not None

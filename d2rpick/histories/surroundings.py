@@ -48,7 +48,7 @@ class Surroundings:
         return tuple(supports)
 
     def held(self, parts: Iterable[Part] | None, time: float) -> str | None:
-        """Return a sentence on the support of the given parts, or of the model, at a time; None if there is none."""
+        """Return a sentence on the support that holds the given parts, or the model, at a time; None if none does."""
         for number in _list_ids(parts):
             for support in self.supports.get(number, ()):
                 if support.start <= time <= support.end:
@@ -61,7 +61,7 @@ class Surroundings:
     def free(
         self, parts: Iterable[Part] | None, time: float
     ) -> tuple[float, float] | None:
-        """Return the interval around ``time`` in which no support holds these parts or the model; None if one does."""
+        """Return the interval around ``time`` in which no support holds these parts, or the model; None if one does."""
         start, end = -inf, inf
         for support in self.supports_of(parts):
             if support.start <= time <= support.end:

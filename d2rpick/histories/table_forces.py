@@ -22,7 +22,7 @@ _NO_FORCE: Final = r"(?i)energy|work|moment|ratio"
 
 
 def find_forces(database: Legs) -> tuple[ContactForce, ...]:
-    """Return the contact forces of a database; in a table, each column named as a contact force is one force."""
+    """Return the contact forces of a database. In a table, each column named like a contact force is a force."""
     if READERS[database.format].solver:
         return database.contact_forces
     names = [

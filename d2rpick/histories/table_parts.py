@@ -1,4 +1,4 @@
-"""Name and read the columns of a table with the internal energies of parts that were not chosen."""
+"""Name and read the table columns with the internal energies of parts that were not chosen."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ if TYPE_CHECKING:
     from d2rpick.histories.database import Legs
     from d2rpick.histories.history import Samples
 
-# Column of a written table with the energy of the chosen parts.
+# Name of the column with the energy of the chosen parts in a written table.
 CHOSEN_ENERGY: Final = "internal_energy"
 _NOT_CHOSEN: Final = "not_chosen_part_"
 
 
 def name_energy_of_part_not_chosen(part: Part) -> str:
-    """Return the name of the column with the internal energy of a part that was not chosen.
+    """Return the name of the column for the internal energy of a part that was not chosen.
 
     Examples
     --------
@@ -33,7 +33,7 @@ def name_energy_of_part_not_chosen(part: Part) -> str:
 
 
 def find_parts_not_chosen(database: Legs) -> tuple[Part, ...]:
-    """Return the parts whose energies a table has beside that of the chosen parts; empty for a file of a solver."""
+    """Return the parts whose energies a table contains in addition to the chosen parts; empty for a solver file."""
     if READERS[database.format].solver:
         return ()
     names = (
@@ -43,6 +43,6 @@ def find_parts_not_chosen(database: Legs) -> tuple[Part, ...]:
 
 
 def read_energies_of_parts_not_chosen(database: Legs, parts: Sequence[Part]) -> Samples:
-    """Return the internal energies of parts that were not chosen, one column each, shape (n, parts) [energy]."""
+    """Return the internal energies of parts that were not chosen, one column per part, shape (n, parts) [energy]."""
     columns = [database.channel(name_energy_of_part_not_chosen(part)) for part in parts]
     return np.stack(columns, axis=1)

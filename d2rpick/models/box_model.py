@@ -1,4 +1,4 @@
-"""Define the box, its step, the sled and the ground in their initial state, and the bar forces.
+"""Define the box, its step, the sled and the ground in their initial state, and the forces of the bars.
 
 The box is the cross-section of a thin-walled body in its plane of roll: an outer and an inner ring of mass points,
 connected by bars along both rings, across, and diagonally. So its walls bend, the frame racks, and it has twice as
@@ -25,7 +25,7 @@ _POSITIVE = (
     "braking", "stiffness", "yield_strain", "mass", "width", "height", "wall", "step_mass", "step_stiffness",
     "step_yield_strain", "ground_stiffness", "roof_strength",
 )  # fmt: skip
-# Smallest number of cells along a side; with fewer cells, the step could not span a quarter of the leading side.
+# Smallest number of cells along a side. With fewer cells, the step could not span a quarter of the leading side.
 _COARSEST = 4
 # Number of bars per cell. The cells of the leading side are listed first, then the cells of the roof.
 _BARS = 5
@@ -116,7 +116,7 @@ class Truss(NamedTuple):
         axial: float,
         yield_strain: float,
     ) -> Truss:
-        """Return straight bars with axial stiffness ``axial`` [N] that are stress-free at these points."""
+        """Return straight bars between these points that have the axial stiffness ``axial`` [N] and no stress."""
         pairs = np.array(ends, dtype=np.intp)
         lengths = np.abs(points[pairs[:, 1]] - points[pairs[:, 0]])
         return cls(
@@ -181,7 +181,7 @@ def build_structure(parameters: Parameters) -> Structure:
 
 
 def _make_ring(mesh: int) -> Plane:
-    """Return points around a square of side 1 about the origin, beginning at its lower leading corner and going up."""
+    """Return points around a square of side 1 about the origin, from its lower leading corner upwards."""
     side = np.arange(mesh) / mesh - 0.5
     return np.concatenate(
         [0.5 + 1j * side, -side + 0.5j, -0.5 - 1j * side, side - 0.5j]
@@ -194,7 +194,7 @@ def _scale_ring(ring: Plane, width: float, height: float) -> Plane:
 
 
 def _list_bars_of_box(cells: int) -> list[tuple[int, int]]:
-    """Return the bars of the box: along both rings, across, and both diagonals of every cell."""
+    """Return the bars of the box: along both rings, between the rings, and along both diagonals of every cell."""
     ends = []
     for cell in range(cells):
         following = (cell + 1) % cells
@@ -208,7 +208,7 @@ def _list_bars_of_box(cells: int) -> list[tuple[int, int]]:
 
 
 def _list_bars_of_step(cells: int, top: int) -> list[tuple[int, int]]:
-    """Return the bars of the step: one between its two points, and four from each of them to nearby box points."""
+    """Return the bars of the step: one between its two points, and four from each point to nearby box points."""
     low = 2 * cells
     high = 2 * cells + 1
     to_skin = [(toe, skin) for toe in (low, high) for skin in (0, top)]

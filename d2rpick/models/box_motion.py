@@ -31,22 +31,22 @@ from d2rpick.models.box_model import (
 # This stiffness does not limit the time step; the weight of the box causes a penetration of 0.5 mm.
 STIFFNESS = 5e5
 # Sliding speed below which friction is proportional to the speed [m/s].
-# Typical sliding speeds are 100 times the value of SLIP.
+# Typical sliding speeds are 100 times this speed.
 SLIP = 0.1
-# A point up to this depth below the floor [m] touches the floor; deeper points have left the sled.
+# A point at most this far below the floor [m] touches the floor; deeper points have left the sled.
 DEEPEST = 0.1
 # Thickness of the curb at the end of the sled [m].
 CURB_THICKNESS = 0.05
-# No point moves faster than FASTEST times the initial speed plus FALL plus twice the drop speed [m/s].
+# No point moves faster than FASTEST times the initial speed, plus FALL and twice the drop speed [m/s].
 # The largest possible speed gives the time within which no point can reach the floor, the curb or the ground.
 # FALL is the speed of a point after a fall of 1 m [m/s].
 FASTEST, FALL = 4.0, 5.0
-# Longest gap between contact forces of the same contact [s]; such gaps occur because corners rattle.
+# Longest gap between two contact forces that belong to the same contact [s]; gaps occur because corners rattle.
 SAME_CONTACT = 2e-3
 
 # Safety factor on the stable time step 2/omega [-], which is exact only for linear bars without contact.
 _SAFETY = 0.9
-# Times that exceed a whole number of time steps by at most this fraction of a time step are rounded down [-].
+# Times that exceed a whole number of time steps by at most this fraction of a step are rounded down [-].
 _SAME = 1e-6
 
 
@@ -91,7 +91,7 @@ class Sled:
 
 
 class Contact:
-    """The contact forces on the points of a structure; the crushed depth of the cushion is kept as state.
+    """The contact forces on the points of a structure; the depth to which the cushion is crushed is kept as state.
 
     ``released`` is the last time at which the sled pushed before the first contact with the ground; ``landings`` are
     the intervals (start, end) in which the ground pushed [s].
@@ -153,7 +153,7 @@ class Contact:
         )
 
     def _on_all(self, face: Face, points: Ends) -> Face:
-        """Return forces on selected points as an array for all points; the other points get zero forces."""
+        """Return the forces on selected points as an array for all points, with zero forces on the other points."""
         forces = np.zeros((2, self._points), dtype=np.complex128)
         forces[:, points] = face
         return Face(*forces)
@@ -170,20 +170,20 @@ class Contact:
         return float(min(to_floor, to_curb, to_ground))
 
     def _floor(self, positions: Plane, sliding: Plane) -> Face:
-        """Return the forces of the floor on the points of the skin [N]."""
+        """Return the forces of the floor on the points on the surface of the structure [N]."""
         above = (positions.real < CURB_THICKNESS) & (positions.imag > -DEEPEST)
         depth = np.where(above, np.maximum(-positions.imag, 0.0), 0.0)
         return self._with_friction(STIFFNESS * depth, sliding.real)
 
     def _ground(self, positions: Plane, sliding: Plane) -> Face:
-        """Return the forces of the ground on the points of the skin [N]."""
+        """Return the forces of the ground on the points on the surface of the structure [N]."""
         depth = np.maximum(-self._p.ground - positions[self._skin].imag, 0.0)
         return self._with_friction(
             self._p.ground_stiffness * depth, sliding[self._skin].real
         )
 
     def _curb(self, positions: Plane, sliding: Plane) -> Face:
-        """Return the forces of the curb along -x [N], with friction along z; the curb acts like a floor set upright."""
+        """Return the forces of the curb along -x [N], with friction along z; the curb acts like an upright floor."""
         may_touch = (positions.imag < self._p.curb) & (
             positions.real < self._p.cushion_depth + DEEPEST
         )
@@ -204,7 +204,7 @@ class Contact:
 
 
 class RigidPoints:
-    """Points that move as one rigid body, which starts with the momenta of the points at the switch.
+    """Points that move as one rigid body. At the switch, the body has the linear and angular momentum of the points.
 
     ``arms`` from the centre of mass to the points, rotated with the body (n,) [m]; ``velocity`` of the centre [m/s];
     ``spin`` from x to z [rad/s].
@@ -317,7 +317,7 @@ class BoxMotion:
         """
         frozen_bars = (self.box, self.step) if with_step else (self.box,)
         self._deformable_bars = () if with_step else (self.step,)
-        # The forces are evaluated again so that bars yield before they are frozen.
+        # The forces are evaluated again, so that bars yield before they are frozen.
         for bars in frozen_bars:
             bars.forces(self.places)
         s = self.structure

@@ -1,4 +1,4 @@
-"""Compute complete box runs, switched or not, their histories, and scans over tr."""
+"""Compute complete box runs, with or without rigid windows, their histories, and scans over tr."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ if TYPE_CHECKING:
 PARTS: Final = ("box", "step")
 BOX: Final = 0
 _REALS, _PLANES = 12, 4
-# Number of states whose results are computed at once, because calling numpy for single states would be slow.
+# Number of states whose results are computed at once, because numpy calls for single states would be slow.
 _BLOCK: Final = 256
 
 # Default output interval [s], which gives 25 states per period of a 400 Hz mode.
 INTERVAL = 1e-4
-# Largest number of time steps, which takes minutes to compute; a request for more is probably a mistake.
+# Largest number of time steps, which take minutes to compute; a request for more is probably a mistake.
 MOST_STEPS = 5_000_000
 # _FINE: interval between the tr values of a scan while the load may still act [s].
 # _COARSE: interval between the tr values during the flight [s]; it gives six values per energy period of 25 ms.
-# _LAST: time before td in which no tr is tried [s].
+# _LAST: time before td during which no tr is tried [s].
 _FINE, _COARSE, _LAST = 0.003, 0.004, 0.03
 
 
@@ -150,7 +150,7 @@ class Recorder:
             self._work_out()
 
     def _work_out(self) -> None:
-        """Compute the results of the states stored since the last complete block."""
+        """Compute the results of the states that were stored after the last complete block."""
         count = (self._next - 1) % _BLOCK + 1
         states = slice(self._next - count, self._next)
         s = self._motion.structure
@@ -222,7 +222,7 @@ class Recorder:
 
 
 def _count_updates(motion: BoxMotion) -> int:
-    """Return how often bar forces have been evaluated so far."""
+    """Return the number of evaluations of the bar forces so far."""
     return motion.box.evaluations + motion.step.evaluations
 
 
@@ -261,7 +261,7 @@ def simulate(
     >>> run.time.size, bool(abs(run.imbalance).max() < 0.01)
     (101, True)
     """
-    # Overflow warnings are suppressed; an overflow appears as too many time steps, which are rejected below.
+    # Overflow warnings are suppressed, because an overflow appears as too many time steps, which are rejected below.
     with np.errstate(over="ignore"):
         motion = BoxMotion(parameters, interval)
     if motion.step_at(t_end) > MOST_STEPS:
@@ -277,7 +277,7 @@ def simulate(
 
 
 def continue_motion(motion: BoxMotion, t_end: float, *windows: RigidWindow) -> Record:
-    """Continue ``motion`` to ``t_end`` [s], switching at the first time step at or after the times of ``windows``.
+    """Continue ``motion`` to ``t_end`` [s] and switch at the first time step at or after the times of ``windows``.
 
     Raises RangeError if its numbers become infinite.
     """
@@ -301,7 +301,7 @@ def continue_motion(motion: BoxMotion, t_end: float, *windows: RigidWindow) -> R
 
 
 def run_to(motion: BoxMotion, time: float) -> None:
-    """Continue a motion, without switching, to the first time step at or after ``time`` [s]."""
+    """Continue a motion without switching to the first time step at or after ``time`` [s]."""
     for _ in range(motion.step_at(time) - motion.count):
         motion.advance()
         motion.move()
@@ -309,7 +309,7 @@ def run_to(motion: BoxMotion, time: float) -> None:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class BoxEvidence(Given):
-    """The momentum and the internal energy of the box and of the step, as in the ``matsum`` of a run.
+    """The momentum and the internal energy of the box and of the step, as a run's ``matsum`` file lists them.
 
     ``part_energies`` holds the energies, ``values`` of shape (n, 2) [J].
     """
@@ -346,7 +346,7 @@ def make_history(record: Record) -> History:
 
 
 class Outcome(NamedTuple):
-    """One switched run compared with the reference run.
+    """One switched run in comparison with the reference run.
 
     ``energy`` is the energy of the box at tr, which is locked in [J], ``energy_ratio`` its ratio to the energy at td.
     The errors at td are ``roll_error`` [degrees], ``x_error`` and ``z_error`` of the centre of mass [m], and
@@ -428,7 +428,7 @@ def scan(
 def _make_branches(
     motion: BoxMotion, times: Iterable[float], td: float, end: float
 ) -> Iterator[tuple[BoxMotion, float, RigidWindow]]:
-    """Yield, for each tr, a copy of the reference run advanced to that tr, the end time of the run, and its window."""
+    """Yield, for each tr, a copy of the reference run at that tr, the end time of the switched run, and its window."""
     for tr in times:
         run_to(motion, tr)
         yield motion.copy(), end, RigidWindow(tr, td)

@@ -1,1 +1,1 @@
-"""Write results as text: a table for people; JSON, CSV and Markdown for programs. This folder prints nothing."""
+"""Write results as text: tables for people; JSON, CSV and Markdown for programs. The modules here print nothing."""

@@ -44,7 +44,7 @@ _FILE: Final = "weights.toml"
 
 
 def as_table(calibration: FittedWeights, display: DisplayOptions) -> str:
-    """Return a table of the assumed and fitted weight of each formulation, and a table of the restart segments used."""
+    """Return a table of each formulation's assumed and fitted weight, and a table of the restart segments used."""
     weights = calibration.weights
     lines = [
         *tables.format_in_line(list_verdict_lines(calibration, display.question)), "",

@@ -31,7 +31,7 @@ def list_verdict_lines(decision: Decision, tr: float, td: float) -> Lines:
 
 
 def describe_expectation(decision: Decision) -> str:
-    """Return the expected error after td and the largest possible error as text."""
+    """Return, as text, the expected error after td and the largest possible error."""
     worst = decision.worst_case
     if worst == "the same":
         return decision.expected
@@ -39,7 +39,7 @@ def describe_expectation(decision: Decision) -> str:
 
 
 def list_statements(decision: Decision) -> Lines:
-    """Return a sentence on the motion and a sentence on the vibration, omitting what the verdict already states."""
+    """Return a sentence on the motion and one on the vibration, without what the verdict already states."""
     motion = decision.quality.motion
     vibration = decision.quality.vibration
     alone = decision.quality.alone
@@ -58,12 +58,12 @@ def list_statements(decision: Decision) -> Lines:
 
 
 def explain_grade(grade: Grade, decision: Decision) -> str:
-    """Return why a grade is not better and how to improve it, unless the verdict already states this."""
+    """Return why a grade is not better and how to improve it, unless the verdict already states both."""
     causes = [cause for cause in grade.causes if cause.reason not in decision.reason]
     if not causes:
         return ""
     reasons = "; ".join(cause.reason for cause in causes)
-    # A better pair is a cure that the verdict already names.
+    # A better pair is a cure that the verdict already mentions.
     curable = [
         cause
         for cause in causes
@@ -78,7 +78,7 @@ def explain_grade(grade: Grade, decision: Decision) -> str:
 
 
 def number_reasons(decisions: Iterable[Decision]) -> dict[str, int]:
-    """Assign a number to each reason why a verdict is no better; each reason is explained once below a table."""
+    """Number the reasons why verdicts are no better, each of which is explained once below a table."""
     reasons = (
         decision.general_reason for decision in decisions if decision.grade != GOOD
     )
@@ -109,12 +109,12 @@ def format_in_full(decision: Decision) -> str:
 
 
 def format_rigid_time(best: Candidate) -> str:
-    """Return the time for which the parts are rigid, as text."""
+    """Return the time for which the parts are rigid as text."""
     return f"{best.rigid_time:.6g}, {best.rigid_fraction:.0%} of the simulated time"
 
 
 def format_accuracy(best: Candidate) -> str:
-    """Return the accuracy and the timing tolerance of tr as text; empty if neither is known."""
+    """Return the accuracy and the timing tolerance of tr as text; empty if both are unknown."""
     interval = (
         "" if best.tr_high is None else f"accurate to ±{best.tr_high - best.tr:.1g}"
     )
@@ -132,5 +132,5 @@ def format_saving(best: Candidate) -> str | None:
 
 
 def format_saved_share(run_time_share: float) -> str:
-    """Return the CPU time saved as text, for a run that takes the fraction ``run_time_share`` of the CPU time."""
+    """Return the saved CPU time as text, for a run that takes the fraction ``run_time_share`` of the CPU time."""
     return f"about {1 - run_time_share:.0%} of the CPU time"

@@ -1,4 +1,4 @@
-"""Write the result of ``drive`` as a table and JSON."""
+"""Describe the progress of ``drive``, and write its result as a table and JSON."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from d2rpick.report.fields import Document, Field, many, row
 
 if TYPE_CHECKING:
     from d2rpick.report.formats import DisplayOptions
-    from d2rpick.running.drive import Driven
+    from d2rpick.running.drive import Driven, Driver
 
 _WINDOW: Final = row(
     Field("free", "number", "time from which no force acts"),
@@ -38,6 +38,15 @@ _NOT_KNOWN: Final = (
     "without a reference run, tr is not matched to the energy at td, so the vibration after td may be "
     "wrong"
 )
+
+
+def describe_progress(driver: Driver, seconds: float) -> str:
+    """Describe the engine run being computed, or how many ``seconds`` the starter has run before the first one."""
+    order = driver.at
+    if order is None:
+        return f"starting ... {seconds:.0f} s"
+    end = driver.limits.end
+    return f"engine run {order.number}, {order.kind}: {order.start:.6g} to {order.until:.6g} of {end:g}"
 
 
 def as_table(answer: Driven, display: DisplayOptions) -> str:

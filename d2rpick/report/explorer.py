@@ -1,4 +1,4 @@
-"""Build the interactive part of a page, which updates everything that depends on td when the user changes td.
+"""Build the interactive part of a page. It updates everything that depends on td when the user changes td.
 
 Python computes all numbers and texts; the script in ``explorer.js`` only looks them up.  ``explorer.html`` contains
 the elements that every page has.
@@ -45,13 +45,13 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
 
 
-# Number of intervals of a curve in the view and in the overview; the lowest and highest energy in each are drawn.
+# Number of intervals of a curve in the view and in the overview; in each, the lowest and highest energy are drawn.
 _STRETCHES: Final = 600
 _OVERVIEW: Final = 200
-# Separator between the three parts of ``explorer.html``: the section, the motion chart and the values of a pair.
+# Separator of the three parts of ``explorer.html``: the section, the motion chart and the values of a pair.
 _NEXT: Final = "<!-- next -->"
 
-# Labels of the values shown for a pair, keyed by value name and in display order.
+# Labels of the values that are shown for a pair, by value name and in display order.
 _VALUES: Final[Mapping[str, str]] = {
     "verdict": "verdict",
     "why": "why",
@@ -142,7 +142,7 @@ def build_explorer(explored: Explorer | None) -> Markup:
 
 
 def _strip_whitespace(text: str) -> str:
-    """Remove whitespace between elements, and collapse whitespace within strings to a single space."""
+    """Remove whitespace between elements, and reduce whitespace within strings to single spaces."""
     return re.sub(r"\s*\n\s*", " ", re.sub(r"\s*\n\s*(?=<|$)|(?<=>)\s*\n\s*", "", text))
 
 
@@ -227,7 +227,7 @@ def _round_curve(values: Samples) -> list[float]:
 
 
 def _build_offer_table(trade_off: TradeOff, first: Offer, view: View) -> dict[str, Any]:
-    """Return one row per td and a common header; ``numbers`` are drawn as curves, and ``texts`` are shown next to them.
+    """Return a row per td and a common header; ``numbers`` are drawn as curves, ``texts`` are shown next to them.
 
     ``first`` is the offer whose td is shown first; the others are compared with it.
     """
@@ -276,7 +276,7 @@ def _compute_saved_percentage(offer: Offer) -> float | None:
 
 
 def _mark_columns(windows: Sequence[AcceptableWindow], view: View) -> str:
-    """Mark the view columns that windows touch, as a bit mask in hexadecimal digits; empty if there are no windows.
+    """Mark the columns of the view that windows touch, as a bit mask in hexadecimal digits; empty without windows.
 
     The mask has the same length for any number of windows, of which noise makes many, and is finer than a screen.
     """
@@ -300,14 +300,14 @@ def _round_number(value: float | None) -> float | None:
 
 
 def _name_error(offers: Sequence[Offer]) -> str:
-    """Return the name of the error that is used to compare the proposed pairs."""
+    """Return the name of the error by which the proposed pairs are compared."""
     if all(offer.basis == "energy" for offer in offers):
         return "level shortfall"
     return "residual"
 
 
 def _name_saving(offers: Sequence[Offer]) -> str:
-    """Return the label of the saving: CPU time or, if the cost of the parts is unknown, rigid time."""
+    """Return the label of the saving: CPU time or, if the costs of the parts are unknown, rigid time."""
     is_cost_known = any(offer.saving is not None for offer in offers)
     if is_cost_known:
         return "saved, % of the CPU time"
@@ -317,7 +317,7 @@ def _name_saving(offers: Sequence[Offer]) -> str:
 def _list_texts(
     offer: Offer, decision: Decision | None, start: Offer, unit: str
 ) -> dict[str, str | None]:
-    """Return all texts shown for a td, in the words of ``suggest --td``; None for unknown values."""
+    """Return all texts that are shown for a td, in the words of ``suggest --td``; None for unknown values."""
     best = offer.best
     return {
         "td": format_short(offer.td),

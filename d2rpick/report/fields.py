@@ -42,7 +42,7 @@ class Kind(NamedTuple):
         return next(field for field in self.fields if field.key == key)
 
 
-# Types that many fields use. A question mark means that None is allowed. A "size" is a number >= 0.
+# Types that many fields use. A question mark means that None is allowed. A "size" is a number that is at least 0.
 Name = Literal[
     "number", "number?", "size?", "integer", "integer?", "text", "text?", "texts", "texts?", "flag", "flag?", "span",
     "span?",
@@ -50,7 +50,7 @@ Name = Literal[
 
 
 class Field(NamedTuple):
-    """A key with the type and meaning of its value; ``get`` returns the value, by default the attribute of that name.
+    """A key with the type and meaning of its value; ``get`` returns the value (by default the attribute of that name).
 
     ``later`` is True if the field was added after the first schema, so that older results may lack it.
     """
@@ -62,11 +62,11 @@ class Field(NamedTuple):
     later: bool = False
 
     def of(self, thing: Any) -> Any:
-        """Return the value of this field in an object, converted to JSON."""
+        """Return the value of this field of an object, converted to JSON."""
         return get_kind(self.kind).plain(self.taken(thing))
 
     def taken(self, thing: Any) -> Any:
-        """Return the value of this field in an object, unchanged."""
+        """Return the value of this field of an object, unchanged."""
         if self.get:
             return self.get(thing)
         if isinstance(thing, Mapping):
@@ -87,7 +87,7 @@ def row(
     closed: bool = False,
     **keywords: Any,
 ) -> Kind:
-    """Make the type of an object with these fields. If it is ``closed``, the object has no other keys.
+    """Make the type of an object with these fields. A ``closed`` object has no other keys.
 
     Results of older versions may lack the keys in ``later``; other ``keywords`` are added to the schema unchanged.
 
@@ -176,7 +176,7 @@ _KINDS: Final = {**_KNOWN, **{f"{name}?": maybe(kind) for name, kind in _KNOWN.i
 
 
 class Document(NamedTuple):
-    """A result as JSON: schema ``name``, description, and the fields after "schema", "tool_version" and "command".
+    """A result as JSON: its schema ``name``, its description, and the fields after the fields of every document.
 
     Objects of a ``closed`` document have no other keys.  ``also`` lists objects of other forms of the result, which the
     schema defines too.
@@ -217,7 +217,7 @@ class Document(NamedTuple):
     def as_json(
         self, answer: Any, command: Sequence[str], indent: int | None = 2
     ) -> str:
-        """Write an answer according to its schema, as one line (newline-delimited JSON) if ``indent`` is not given."""
+        """Write an answer according to its schema; without ``indent``, write a single line (newline-delimited JSON)."""
         return tables.as_json(self.of(answer, command), indent)
 
 

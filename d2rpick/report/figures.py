@@ -35,25 +35,25 @@ REFERENCE, SWITCHED, GOOD, FLIGHT, BETTER = (
     "#56b4e9",
     "#0072b2",
 )
-# Colour of items without a verdict, such as admissible times and rigid windows of a finished run.
-# Green, yellow and red are not used here, because they stand for verdicts.
+# Colour of things without a verdict, such as admissible times and rigid windows of a finished run.
+# Green, yellow and red are not used here, because these colours stand for verdicts.
 NEUTRAL: Final = "#595959"
 # Width of a figure in a file [inch].
 WIDTH: Final = 10.0
 # Largest width of the label of a switch time, as a fraction of the axes [-]; the key is True for a page.
 LABEL: Final = {False: 0.14, True: 0.28}
-# A logarithmic axis has marks only at powers of ten if its largest value exceeds this multiple of its smallest [-].
+# A logarithmic axis with a ratio of largest to smallest value above this has marks only at powers of ten [-].
 _DECADES: Final = 100.0
-# Number of intervals into which a curve is divided; only the lowest and highest value in each are drawn.
+# Number of intervals into which a curve is divided; in each, only the lowest and highest value are drawn.
 STRETCHES: Final = 400
 # Largest number of letters in a legend name; longer names from files are shortened.
 _LONGEST_NAME = 28
 
-# Width of a figure on a page [inch]; at this width, its letters are as large as the text on a phone.
+# Width of a figure on a page [inch], at which its letters are as large as the text on a phone.
 PAGE_WIDTH: Final = 4.5
 # _TOP: space above the panels for the labels of the switch times [inch].
 # _BETWEEN: space between two panels [inch].
-# _RIGHT: space to the right of the panels for half of the last number on the time axis [inch].
+# _RIGHT: space to the right of the panels, which is needed for half of the last number on the time axis [inch].
 # _BELOW: space below the panels for the time axis [inch].
 # _LINE: height of a legend line [inch].
 # _EDGE: horizontal space next to the label of the vertical axis [inch].
@@ -96,7 +96,7 @@ def note(
     offset: tuple[float, float],
     **look: Any,
 ) -> None:
-    """Write a string at ``position`` (time, height as a fraction of the axes), moved by ``offset`` points."""
+    """Write a string at ``position`` (time, height as a fraction of the axes), shifted by ``offset`` points."""
     look = {"xycoords": ("data", "axes fraction"), "fontsize": "small", **look}
     axes.annotate(text, position, xytext=offset, textcoords="offset points", **look)
 
@@ -123,14 +123,14 @@ def render(figure: figures.Figure, name: str) -> bytes:
 
 @contextmanager
 def ignore_missing_letters() -> Iterator[None]:
-    """Draw letters missing from the font as boxes, and suppress the warning about them."""
+    """Draw letters that the font lacks as boxes, and suppress the warning about these letters."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", r"Glyph \d+ .* missing from", UserWarning)
         yield
 
 
 def make_logarithmic(axes: Axes, low: float, high: float) -> None:
-    """Make the vertical axis logarithmic, with plain numbers, because powers are slow to typeset."""
+    """Make the vertical axis logarithmic with plain numbers, because powers are slow to typeset."""
     axes.set_yscale("log")
     axes.yaxis.set_major_formatter("{x:g}")
     if high > _DECADES * low:
@@ -145,7 +145,7 @@ def show_span(
     scale: Scale,
     above: Sequence[tuple[str, float]],
 ) -> None:
-    """Show a curve at the times in ``span``, and mark where its values are cut off above the scale.
+    """Show a curve at the times in ``span``, and mark where the top of the scale cuts its values off.
 
     Parameters
     ----------
@@ -229,7 +229,7 @@ def format_axes(axes: Axes, *, legend: bool = True) -> None:
 
 
 def _collect_legend_entries(panels: Sequence[Axes]) -> dict[str, Artist]:
-    """Return the legend entries of several panels, each name once."""
+    """Return the legend entries of several panels, with each name only once."""
     panel_entries = (
         zip(*panel.get_legend_handles_labels(), strict=True) for panel in panels
     )
@@ -255,7 +255,7 @@ def add_legend_below(
 
 
 def add_unit(name: str, unit: str) -> str:
-    """Return the label of a time axis, with the unit named in a file, otherwise "units of the run"."""
+    """Return the label of a time axis, with the unit given in a file or else "units of the run"."""
     return f"{name} [{make_plain_text(unit)}]" if unit else f"{name} (unit of the run)"
 
 
@@ -319,7 +319,7 @@ def _place(
 
 
 def render_svg_element(figure: figures.Figure, prefix: str) -> str:
-    """Return a figure as an SVG element for a page; its ids begin with ``prefix``. Text is not drawn as outlines.
+    """Return a figure as an SVG element for a page, with ids that begin with ``prefix``. Text is not drawn as outlines.
 
     The element has no style sheet of its own: that of the page contains what matplotlib would write.
     """

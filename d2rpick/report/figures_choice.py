@@ -56,16 +56,16 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History, Samples
 
 
-# Heights of a figure [inch], with the energy only and with the motion too. On a page, they apply to each panel.
+# Heights of a figure [inch] without and with the motion. On a page, they apply to each panel.
 _HEIGHTS: Final = (4.0, 6.5)
 _PANELS: Final = (2.6, 2.0)
-# Largest number of candidates that are drawn as marks; otherwise, a band shows the admissible tr.
+# Largest number of candidates that are drawn as marks; a larger number is drawn as a band of admissible tr.
 _FEW: Final = 20
-# Height of the band at the bottom of the axes, below the curve, as a fraction of the axes [-].
+# Height of the band below the curve, at the bottom of the axes, as a fraction of the axes [-].
 _BAND: Final = 0.045
 # Time shown before and after the flights of a plan, as a fraction of the time that they span [-].
 _BEYOND_FLIGHTS: Final = 0.05
-# A window of at least this length has its times in its label, as a fraction of the shown time [-].
+# The label of a window contains its times if the window has at least this fraction of the shown time [-].
 _ROOM_FOR_TIMES: Final = 0.15
 
 # Colours of the windows in a plan, keyed by verdict or state.
@@ -95,7 +95,7 @@ _MOST_PARTS: Final = 6
 # _TRADE_HEIGHT: height of the figure of ``explore`` in a file [inch].
 # _TRADE_PANEL: height of each axes in the figure of ``explore`` on a page [inch].
 _TRADE_HEIGHT, _TRADE_PANEL = 7.0, 1.9
-# Space before the first td and after the last td, as a fraction of the axes [-], to show the marks there in full.
+# Space before the first and after the last td, as a fraction of the axes [-], in which their marks fit.
 _AT_EDGE: Final = 0.02
 _ERRORS: Final = {True: "level shortfall", False: "residual"}
 # Palette of Okabe and Ito without yellow, which is hard to see on white. Dashes distinguish lines of the same colour.
@@ -109,14 +109,14 @@ _RUN_COLOURS: Final = (
     "#56b4e9",
 )
 _PATTERNS: Final = ("-", "--")
-# Largest number of runs that are all drawn in colour and named; if there are more runs, only outliers are.
+# Up to this number of runs, all are drawn in colour and named; otherwise, only outliers are.
 _NAMED: Final = 10
 _MOST_OUTLIERS: Final = 5
 _GREY: Final = "#808080"
 # _DARK: largest combined darkness of all grey curves, as an equivalent number of opaque lines.
 # _FAINTEST: smallest opacity of a grey curve [-].
 _DARK, _FAINTEST = 10, 0.02
-# If there are at most this many runs, their lines and marks are drawn thick.
+# Up to this number of runs, their lines and marks are drawn thick.
 _MANY: Final = 40
 # _BEFORE: time shown before the first tr, as a fraction of the time from the first tr to td [-].
 # _AFTER: time shown after td, as a fraction of the time from the first tr to td [-].
@@ -125,9 +125,9 @@ _BEFORE, _AFTER = 0.25, 0.15
 _HEIGHT: Final = 4.0
 # Height of a run name, as a fraction of the axes [-].
 _LINE: Final = 0.055
-# The line that connects a curve to its name ends at the left edge of the name.
+# The line from a curve to its name ends at the left edge of the name.
 _ENDS: Final = {"relpos": (0, 0.5), "shrinkA": 1}
-# The axis includes the lowest level if the median level is at most this many times the lowest level [-].
+# The axis includes the lowest level if the median level is at most this multiple of it [-].
 _LOWEST: Final = 50.0
 
 
@@ -147,7 +147,7 @@ def draw_suggestion(answer: PairSuggestion, *, page: bool = False) -> Figure:
 
 
 def draw_verdict(answer: PairVerdict, *, page: bool = False) -> Figure:
-    """Draw the energy in the flight with the target energy and the judged pair; below, the motion after td.
+    """Draw the energy in the flight with the target energy and the judged pair, and the motion after td below.
 
     With a finished switched run, its energy is drawn over that of the reference instead of the motion of a model.
     """
@@ -259,7 +259,7 @@ def _draw_energy(
 def _draw_better(
     panels: Sequence[Axes], better_situation: Situation, tr: float
 ) -> None:
-    """Draw a better pair at another td: its level, times and motion, in a separate colour and line style."""
+    """Draw a better pair at another td, i.e. its level, times and motion, in a separate colour and line style."""
     lines = [panels[0].axhline(better_situation.energy_td)]
     lines += [
         panel.axvline(time) for panel in panels for time in (tr, better_situation.td)
@@ -326,7 +326,7 @@ def draw_plan(plan: RunPlan, *, page: bool = False) -> Figure:
 
 
 def _name_window_kind(row: PlannedFlight) -> str:
-    """Return the verdict on a window that this run supports; without a verdict, what must be done first."""
+    """Return the verdict on a window that this run supports or, without a verdict, what must be done first."""
     if row.status == "supported" and row.decision:
         return row.decision.verdict
     return row.status
@@ -354,7 +354,7 @@ def _label_window(number: int, window: Times, span: float) -> str:
 def draw_run(
     history: History, flights: Sequence[Times], windows: Sequence[Times] = ()
 ) -> Figure:
-    """Draw the reliable part of the energy of a run, its flights, and the windows in which parts were rigid."""
+    """Draw the reliable part of a run's energy, the flights, and the windows in which parts were rigid."""
     figure, (axes,) = figures.begin(1, _PLAN_HEIGHT, page=True)
     rigid = np.any(
         [(history.time > tr) & (history.time < td) for tr, td in windows], axis=0
@@ -408,7 +408,7 @@ def _finish_run_axes(
 
 
 def draw_trade_off(trade_off: TradeOff, *, page: bool = False) -> Figure:
-    """Draw the energy in the td range, and below it the error and saving of the best pair for each td."""
+    """Draw the energy in the td range and, below it, the error and saving of the best pair at each td."""
     figure, panels = figures.begin(3, _TRADE_HEIGHT, page=page)
     energy, error, rigid = panels
     history = trade_off.situation.history
@@ -535,7 +535,7 @@ def _choose_named_runs(
 def _draw_others(
     axes: Axes, curves: Sequence[Samples], named_runs: Sequence[_Named]
 ) -> None:
-    """Draw the runs without names in grey; the more runs there are, the fainter they are drawn."""
+    """Draw the runs without names in grey, fainter if there are more runs."""
     named_curves = {id(named_run.curve) for named_run in named_runs}
     other_curves = [curve.T for curve in curves if id(curve) not in named_curves]
     is_thin = len(curves) > _MANY
@@ -610,7 +610,7 @@ def _select_energies(
 
 
 def _write_names(axes: Axes, named_runs: Sequence[_Named], *, page: bool) -> None:
-    """Write the run names next to the axes, in the order of the curves; a line connects each name to its curve."""
+    """Write the run names next to the axes in the order of the curves; a line connects each name to its curve."""
     end = axes.get_xlim()[1]
     free = 0.0
     runs_by_height = (

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from d2rpick.vibration.oscillator import Replay, Trajectory
 
 
-# Number of outlines of the rolling box; it is small, so that the outlines can be distinguished.
+# Number of outlines of the rolling box, which is small so that the outlines can be distinguished.
 _OUTLINES = 8
 
 _SLED_LENGTH: Final = 1.6
@@ -62,7 +62,7 @@ def draw_rollover(
     switched: Record | None = None,
     windows: Sequence[RigidWindow] = (),
 ) -> Figure:
-    """Draw outlines of the box at regular times with the sled, curb and ground; below, roll angle and height over time.
+    """Draw outlines of the box at regular times with sled, curb and ground and, below, roll angle and height over time.
 
     ``switched`` is a run of the same box, rigid in ``windows``; if given, the difference of the two runs is drawn too.
     """
@@ -171,7 +171,7 @@ def _draw_times(axes: Axes, reference: Record, windows: Sequence[RigidWindow]) -
 def draw_scan(
     reference: Record, outcomes: Sequence[Outcome], answer: PairSuggestion
 ) -> Figure:
-    """Draw the energy of the box with its level at td; below, the errors of roll and mean energy for each tr."""
+    """Draw the energy of the box with its level at td and, below, the errors of roll and mean energy for each tr."""
     figure = Figure(figsize=(9, 8), layout="constrained")
     energy, roll, mean = figure.subplots(3, 1, sharex=True)
     is_before_td = reference.time <= answer.situation.td

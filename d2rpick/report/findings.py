@@ -1,4 +1,4 @@
-"""Write the findings of ``check`` as a table, JSON, GitHub annotations, JUnit XML and SARIF; explain its rules."""
+"""Write the findings of ``check`` as a table, JSON, GitHub annotations, JUnit XML and SARIF, and explain its rules."""
 
 from __future__ import annotations
 
@@ -128,7 +128,7 @@ def as_table(checks: Checks, display: DisplayOptions) -> str:
 
 
 def _switches_at_unknown_times(result: Checked) -> bool:
-    """Return True if the run itself decides when a deck switches, and no history shows these times."""
+    """Return True if the run itself decides when a deck switches and no history shows when this happened."""
     return result.switches_itself and not result.windows
 
 
@@ -179,7 +179,7 @@ def _name_next_step(checks: Checks) -> str:
 
 
 def as_ndjson(checks: Checks, display: DisplayOptions) -> str:
-    """Return one line of JSON per deck, each with the schema of a complete result."""
+    """Return a line of JSON per deck, each with the schema of a complete result."""
     deck_checks = (replace(checks, results=[result]) for result in checks.results)
     return "\n".join(
         DOCUMENT.as_json(deck_check, display.command, None)
@@ -188,7 +188,7 @@ def as_ndjson(checks: Checks, display: DisplayOptions) -> str:
 
 
 def as_csv(checks: Checks, _: DisplayOptions) -> str:
-    """Return CSV with a row per verdict and per finding, and a column for each key of ``findings`` in the JSON output.
+    """Return CSV with a row per verdict and per finding, and a column per key of ``findings`` in the JSON output.
 
     The row of a verdict has no rule.
     """
@@ -225,7 +225,7 @@ def as_markdown(checks: Checks, _: DisplayOptions) -> str:
 
 
 def as_github(checks: Checks, _: DisplayOptions) -> str:
-    """Return workflow commands that make GitHub Actions show verdicts and findings next to the deck lines."""
+    """Return workflow commands by which GitHub Actions shows verdicts and findings next to the lines of the deck."""
     verdicts = [
         f"::notice file={_escape_for_github(judged.file, ',:')},line={judged.line},col={judged.column},"
         f"title={judged.verdict}::{_escape_for_github(judged.sentence)}"
@@ -253,7 +253,7 @@ def as_github(checks: Checks, _: DisplayOptions) -> str:
 
 
 def as_junit(checks: Checks, _: DisplayOptions) -> str:
-    """Return a JUnit suite per deck and a case per finding; findings less severe than ``fail_on`` pass with a message.
+    """Return a JUnit suite per deck and a case per finding. Findings below ``fail_on`` pass with a message.
 
     The output of the suite is the verdicts.
     """
@@ -309,7 +309,7 @@ def as_junit(checks: Checks, _: DisplayOptions) -> str:
 
 
 def _make_sarif_help(rule: Rule) -> dict[str, str]:
-    """Return the fix for the findings of a rule, and the place in the documentation that explains the rule.
+    """Return the remedy for the findings of a rule, and the place in the documentation that explains the rule.
 
     SARIF requires an absolute address as ``helpUri``.  The documentation has none, so the text names its page and
     anchor.
@@ -393,7 +393,7 @@ def _format_windows(windows: Sequence[CheckedWindow], root: str) -> Iterator[str
 
 
 def _group_alike(windows: Sequence[CheckedWindow]) -> Iterator[list[CheckedWindow]]:
-    """Yield the windows in groups that have the same cards, times and verdict."""
+    """Yield the windows in groups with the same cards, times and verdict."""
     alike = (
         (
             (window.cards, window.unit.kind, window.tr, window.td, window.decision),
@@ -425,7 +425,7 @@ class _JudgedWindow(NamedTuple):
 
 
 def _list_judged_windows(checks: Checks, *results: Checked) -> Iterator[_JudgedWindow]:
-    """Yield the verdicts on the windows of all decks, or of some ``results``, with displayed paths."""
+    """Yield the verdicts on the windows of all decks, or of given ``results``, with paths for display."""
     for result in results or checks.results:
         for group in _group_alike(result.windows):
             place = group[0].place
@@ -469,7 +469,7 @@ def _list_decision_values(decision: Decision | None) -> dict[str, str | None]:
 
 
 def _list_findings(checks: Checks, *results: Checked) -> Iterator[Finding]:
-    """Return the findings in all decks, or in some ``results``, with displayed paths."""
+    """Return the findings in all decks, or in given ``results``, with paths for display."""
     for finding in (
         finding for result in results or checks.results for finding in result.findings
     ):
@@ -480,7 +480,7 @@ def _list_findings(checks: Checks, *results: Checked) -> Iterator[Finding]:
 
 
 def _list_warnings(checks: Checks) -> list[Caution]:
-    """Return all warnings, including one for each deck that could not be read."""
+    """Return all warnings, including a warning for each deck that could not be read."""
     return [
         *checks.cautions,
         *(
@@ -572,7 +572,7 @@ def _escape_for_github(text: str, separators: str = "") -> str:
 
 
 def _escape_for_xml(text: str) -> str:
-    """Replace characters that XML 1.0 does not allow or that a terminal does not show."""
+    """Replace characters that XML 1.0 does not allow or a terminal does not show."""
     return re.sub(_NOT_XML, "?", make_printable(text))
 
 
@@ -616,7 +616,7 @@ def _explain_matching_rules(
 
 
 def explain_rule(rule: Rule, width: int, *, with_examples: bool) -> str:
-    """Explain one rule: what it finds, why that matters, and examples of decks that pass and fail.
+    """Explain one rule: what it finds, why that matters, and examples of decks that pass or fail it.
 
     Without the decks the last line says how to print them.
     """
@@ -638,7 +638,7 @@ def explain_rule(rule: Rule, width: int, *, with_examples: bool) -> str:
 
 
 def _format_example(title: str, example: Example, width: int) -> Iterator[str]:
-    """Return the lines of an example deck, of the files that it includes, and of the files to which it is compared."""
+    """Return the lines of an example deck, of its include files, and of the files with which it is compared."""
     if example.history:
         yield f"{title}, with the history of"
         yield tables.wrap_command(

@@ -35,7 +35,7 @@ FORMATS: Final[Mapping[str, Sequence[str]]] = {
 
 
 class WrittenDeck(NamedTuple):
-    """The folder of a deck that was written with the cards of a plan, and the result of its check.
+    """The folder of a deck that was written with the cards of a plan, and the result of checking this deck.
 
     ``passed`` is True if the check found no error, ``warned`` if it found an error or a warning.
     """
@@ -96,7 +96,9 @@ class DisplayOptions(NamedTuple):
 
 
 def write(result: str, form: str, answer: Any, display: DisplayOptions) -> str:
-    """Write an answer in a format: JSON by the ``DOCUMENT`` of a report module, other formats by its ``as_FORM``.
+    """Write an answer in a format.
+
+    JSON is written by the ``DOCUMENT`` of a report module, any other format by ``as_FORM``.
 
     Examples
     --------

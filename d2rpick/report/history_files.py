@@ -23,7 +23,7 @@ _SUFFIXES: Final = {"csv": "csv", "h5": "hdf5", "hdf5": "hdf5", "hdf": "hdf5"}
 
 
 def choose_history_format(name: str | None, formats: Sequence[str]) -> str:
-    """Return the format for a file name, csv if there is no name; raise FormatError if the suffix implies no format.
+    """Return the format for a file name, or csv if there is no name; raise FormatError if the suffix implies no format.
 
     The suffix determines the format.  A name that has no known suffix must be or contain the name of a solver's
     database.
@@ -97,7 +97,7 @@ def _make_oscillator_matsum(motion: Trajectory, oscillator: Oscillator) -> bytes
 
 
 def _make_box_table(record: Record) -> Table:
-    """Return the columns for the box, the total momentum of the box and the step, and the energy balance of the model.
+    """Return the columns for the box, the total momentum of box and step, and the energy balance of the model.
 
     Internal and kinetic energy belong to the box, so that switch times of the box can be chosen from them.  Separate
     columns contain the energies of the step, the terms of contacts and walls (see `Record`) and the work done.  The
@@ -119,7 +119,7 @@ def _make_box_table(record: Record) -> Table:
 
 
 def _make_box_glstat(record: Record) -> bytes:
-    """Return a glstat of the box and the step: energies, work exchanged with the surroundings, and mean velocity.
+    """Return a glstat of box and step: energies, work exchanged with the surroundings, and mean velocity.
 
     The rigid walls of the model are floor, curb and ground, see `Record`.  Friction on them is part of the contact
     energy and is also listed separately, as in Radioss, since health needs the contact energy without friction.
@@ -142,7 +142,7 @@ def _make_box_glstat(record: Record) -> bytes:
 
 
 def _make_box_matsum(record: Record) -> bytes:
-    """Return a matsum of the box and the step; while the box is rigid, its values follow the rigid-body motion."""
+    """Return a matsum of box and step, whose values follow the rigid-body motion while the box is rigid."""
     from d2rpick.models.box_run import (
         PARTS,
     )  # Imported here to keep start-up fast.
@@ -163,7 +163,7 @@ def _list_writers(
     glstat: Callable[..., bytes],
     matsum: Callable[..., bytes],
 ) -> Mapping[str, Callable[..., bytes]]:
-    """Return the function that writes each format, keyed by format; the arguments are functions that make tables."""
+    """Return, for each format, the function that writes it; the arguments are functions that make tables."""
     tables = {
         form: lambda run, *_, form=form: write_table(form, table(run))
         for form in TABLES

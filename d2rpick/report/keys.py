@@ -1,4 +1,4 @@
-"""Define the fields that several results share, which describe a candidate, the history, its health, and the situation.
+"""Define the fields that several results share. They describe a candidate, the history, its health, and the situation.
 
 Tests compare the schemas in ``d2rpick/schemas`` with these tables; ``python -m tests.generated_schemas`` writes them.
 """
@@ -102,11 +102,11 @@ _POSITION: Final = (
           "true if the position error may be larger: an internal motion that is slower than the flight, or that bends "
           "the body, looks like a rotation; null if unknown", later=True),
 )  # fmt: skip
-# Type of deprecated keys of single parts. They are null for one version before removal, because users may read them.
+# Type of deprecated keys of single parts. They are null for one version before they are removed.
 _NO_VALUE: Final = Kind({"type": "null"})
 NO_PARTS: Final = Field("parts", get_kind("texts", maxItems=0),
                         "deprecated: always empty, since parts are not compared one by one", lambda _: ())  # fmt: skip
-# All values of a candidate. New values are added at the end, so that CSV columns keep their order.
+# All values of a candidate. New values are added at the end, so that the CSV columns keep their order.
 CANDIDATE: Final = row(
     Field("rank", get_kind("integer", minimum=1)),
     Field("tr", "number"),
@@ -155,7 +155,7 @@ CANDIDATE: Final = row(
         later=True,
     ),
 )
-# _OF_TR: keys that explain how tr was chosen but do not rate the pair.
+# _OF_TR: keys that explain how tr was chosen, without rating the pair.
 # _FIRST: keys of the ratings that ``verify`` shows first, in this order.
 _OF_TR: Final = (
     "rank", "tr", "kind", "rising", "tr_low", "tr_high", "acceptable", "recommended", "notes", "same_swing",
@@ -183,7 +183,7 @@ MEASURES: Final = (
     *_FIRST,
     *(key for key in CANDIDATE.keys if key not in (*_OF_TR, *_FIRST)),
 )
-# Keys that are missing in older results of ``suggest`` and ``verify``.
+# Keys that older results of ``suggest`` and ``verify`` lack.
 LATER: Final = (
     "run_time_share",
     "same_swing",
@@ -284,7 +284,7 @@ class Read(Protocol):
 
 
 def _list_files_once(files: Iterable[Read]) -> dict[str, Read]:
-    """Return the files, keyed by name. A file that is included twice is listed once."""
+    """Return the files by name. A file that is included twice is listed once."""
     return {file.name: file for file in files}
 
 
@@ -327,7 +327,7 @@ FRAME: Final = (
 
 
 def _get_oscillator(situation: Situation) -> dict[str, Any] | None:
-    """Return the fitted oscillator as JSON values; None if no oscillator was fitted."""
+    """Return the fitted oscillator as JSON values; None if none was fitted."""
     fit = situation.evidence.fit
     if fit is None:
         return None

@@ -1,4 +1,4 @@
-"""Name the command that follows an answer, with the options and the files of its question, ready to be copied."""
+"""Name the command that follows an answer, with the options and files of its question, ready to be copied."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ if TYPE_CHECKING:
 # Placeholder ids in a command if the user has to name the parts or the nodes, because no file contains them.
 _SOME_PART: Final = "1"
 _SOME_NODE: Final = "1001"
-# Main deck in a command if the user has to name it, and the folder for the copy of it.
+# Placeholders for the main deck in a command if the user has to name it, and for the folder of its copy.
 _SOME_DECK: Final = "DECK"
 _FOLDER: Final = "switched"
-# Why the card of several parts needs the main deck.
+# Reason why the card of several parts needs the main deck.
 _NEEDS_DECK: Final = (
     f" (main deck of the run instead of {_SOME_DECK}; "
     "without it, parts that share nodes become separate rigid bodies)"
@@ -115,6 +115,26 @@ def name_step_to_card(
     return f"print the cards with {line}{hint}"
 
 
+def name_step_with_pair(
+    situation: Situation,
+    pair: tuple[float, float],
+    better: Pair | None,
+    question: RepeatedQuestion,
+    command: str,
+) -> str:
+    """Return the step with a pair that can be used: to the ``better`` pair or, without one, to the card of the pair."""
+    if better is not None:
+        return name_step_to_better_pair(better, question)
+    return name_step_to_card(
+        situation.history,
+        situation.settings,
+        [pair],
+        question,
+        command,
+        flying=situation.flight.by_parts,
+    )
+
+
 def name_step_to_better_pair(better: Pair, question: RepeatedQuestion) -> str:
     """Return the step that judges a better pair."""
     line = write_command(question, "suggest", "--td", f"{better.td:.6g}")
@@ -122,7 +142,7 @@ def name_step_to_better_pair(better: Pair, question: RepeatedQuestion) -> str:
 
 
 def _keep_td(times: Sequence[str]) -> Sequence[str]:
-    """Return the words of ``--td`` or ``--td-window`` among those of the times; empty without either."""
+    """Return the words of ``--td`` or ``--td-window`` among those of the times; empty if neither occurs."""
     for name, values in (("--td", 1), ("--td-window", 2)):
         if name in times:
             position = times.index(name)

@@ -86,7 +86,7 @@ DOCUMENT: Final = Document("d2rpick/info/1", "Answer of d2rpick info; times in t
     Field("verdict_reason", "text", "reason for the verdict, as text", lambda overview: overview.reason, later=True),
     Field("contact_forces", many(_FORCE), "contacts and rigid walls whose forces are in the files", later=True),
 ))  # fmt: skip
-# Largest number of contact times that are listed for a contact that acts often.
+# Largest number of contact times that are listed if a contact acts often.
 _MOST_TIMES: Final = 4
 _PARTS_HEAD = ("part", "title", "highest internal energy")
 # What to do with the record; the verdict of a pair has the same words, so the sentence names the record.
@@ -109,7 +109,7 @@ _PLAIN = (
 
 
 def as_table(overview: Overview, display: DisplayOptions) -> str:
-    """Return as text whether the run can be used, why, and the next command; then one line per fact, and the parts."""
+    """Return, as text, whether the run can be used, why, and the next command; then a line per fact, and the parts."""
     lines = tables.format_in_line(list_overview_lines(overview))
     if overview.health and (health := _list_health_rows(overview)):
         lines += [
@@ -192,7 +192,7 @@ def as_markdown(overview: Overview, _: DisplayOptions) -> str:
 
 
 def as_csv(overview: Overview, _: DisplayOptions) -> str:
-    """Return one row of CSV with a column for each key of the JSON output; semicolons separate the items of a list."""
+    """Return one row of CSV with a column per key of the JSON output; semicolons separate the items of a list."""
     sampling = overview.sampling
     row: dict[str, tables.Cell] = {
         "source": "; ".join(overview.source),
@@ -247,7 +247,7 @@ def list_facts(overview: Overview) -> list[tuple[str, tables.Cell]]:
 
 
 def _list_health_rows(overview: Overview) -> list[list[tables.Cell]]:
-    """Return the health quantities for which the files have data, each with its limit according to good practice."""
+    """Return the health quantities for which the files have data, each with the limit of good practice."""
     if overview.health is None:
         return []
     verdicts = {True: "within limit", False: "exceeded", None: None}

@@ -1,4 +1,4 @@
-"""Build HTML pages from elements, made by nested calls that escape all text, and from sections shared by pages.
+"""Build HTML pages from elements, which nested calls make and which escape all text, and from shared sections.
 
 Shared sections are the cards of a pair, the input that was read, and how to repeat the answer.
 """
@@ -33,35 +33,35 @@ if TYPE_CHECKING:
     from d2rpick.histories.opening import OpenedRun
     from d2rpick.report.keys import Read
 
-# Smallest number of sections for which a page has a table of contents.
+# Smallest number of sections of a page with a table of contents.
 _LONG: Final = 4
 # Largest number of table columns that fit on a narrow screen.
 _FIT = 3
 _HINT = "Where the table goes on to the right, scroll it sideways."
 _VOID = frozenset({"meta", "link", "br", "hr", "input"})
 _NOTHING = "'none'"
-# Characters that change the direction of the surrounding text; they are replaced in pages.
+# Characters that change the direction of the surrounding text, and are therefore replaced in pages.
 _TURNING = {*range(0x202A, 0x202F), *range(0x2066, 0x206A)}
 _CONTROLS = dict.fromkeys(
     {*range(32), *range(127, 160), *_TURNING} - {*map(ord, "\t\n")}, "\ufffd"
 )
 _MOST_FILES: Final = 20  # Largest number of deck files that are named on a page.
-# Labels of the lines on a page that the reader fills in by hand.
+# Labels of the lines that the reader of a page fills in by hand.
 SIGNED: Final = ("chosen by", "date", "signature")
 CHECKED: Final = ("checked by", "date", "signature")
 
-# CSS class of the card and the badge, keyed by verdict.
+# CSS class of the card and the badge by verdict.
 CLASSES: Final = {USE: "use", USE_WITH_CARE: "care", DO_NOT_USE: "refused"}
 
 
 class Markup(str):
-    """Text that is already HTML and needs no escaping."""
+    """Text that is HTML already and needs no escaping."""
 
     __slots__ = ()
 
 
 class PageSection(Markup):
-    """A section of a page, with its title and the id that the table of contents links to."""
+    """A section of a page, with its title and the id to which the table of contents links."""
 
     name: str
     anchor: str
@@ -126,7 +126,7 @@ def build_document(
         make_element("title", title),
         *(make_element("style", sheet) for sheet in sheets),
     )
-    # The lines to be signed are at the top, because they might be printed on a separate sheet below a long card.
+    # The lines to be signed are at the top, because below a long card they might be printed on a separate sheet.
     sign = make_element(
         "p", *(make_element("span", line) for line in signed), class_="sign"
     )
@@ -327,7 +327,7 @@ class PageContext(NamedTuple):
 
 
 def build_front(cards: Sequence[Markup], *below: Markup) -> Markup:
-    """Return the first section: the cards of the chosen or judged pairs side by side, with remarks below."""
+    """Return the first section: the cards of the chosen or judged pairs side by side, with remarks below them."""
     return make_element("section", make_element("div", *cards, class_="choice"), *below)
 
 
@@ -398,7 +398,7 @@ def build_verdict_card(
 
 
 def build_badge(decision: Decision) -> Markup:
-    """Return the verdict in a frame of the verdict's colour."""
+    """Return the verdict in a frame of its colour."""
     class_ = f"badge {CLASSES[decision.verdict]}"
     return make_element("span", decision.verdict, class_=class_)
 
@@ -428,7 +428,7 @@ def list_deck_digests(
 
 
 def list_digests_of_settings(settings: Settings) -> list[tuple[str, str]]:
-    """Return the digests of the deck on which an answer is based; empty if there is no deck."""
+    """Return the digests of the deck on which an answer is based; empty without a deck."""
     used = settings.by_deck
     return list_deck_digests(used.files, used.weights) if used else []
 
@@ -468,7 +468,7 @@ def build_command(command: Sequence[str], stdin: bool = False) -> PageSection:
 def build_solver_input(
     decision: Decision, times: tuple[float, float], record: PageContext
 ) -> Markup:
-    """Return the D2R card of a pair, or the command that prints it; collapsed if the verdict is "do not use"."""
+    """Return the D2R card of a pair, or the command that prints it; it is collapsed if the verdict is "do not use"."""
     title = "Solver input"
     contents = _list_solver_input(times, record)
     if decision.verdict != DO_NOT_USE:
@@ -490,7 +490,7 @@ def build_solver_input(
 def _list_solver_input(
     times: tuple[float, float], record: PageContext
 ) -> tuple[Markup, ...]:
-    """Return the D2R card if the parts to be switched are known, otherwise the command that prints it."""
+    """Return the D2R card if the parts to be switched are known; otherwise return the command that prints it."""
     printing = record.printing
     assert printing is not None
     if record.refusal:

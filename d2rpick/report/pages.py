@@ -60,14 +60,14 @@ if TYPE_CHECKING:
     from d2rpick.running.drive import Driven
 
 
-# Largest number of table rows on a page. More rows cannot be compared by eye; CSV and JSON contain all rows.
+# Largest number of table rows on a page. More rows cannot be compared by eye; CSV and JSON contain all of them.
 _MOST_ROWS = 20
 
 # Largest number of table rows in a notebook.
 _FEW_ROWS: Final = 12
 # Largest width of a picture in a notebook, as a CSS length.
 _WIDEST: Final = "max-width: 40em"
-# Functions that return the sentences, table header and table rows of an answer, keyed by type of answer.
+# For each type of answer, the function that returns its sentences, table header and table rows.
 _LOOKS: Final[
     Mapping[str, tuple[Callable[[Any], list[tuple[str, str]]], Callable[[Any], Any]]]
 ] = {
@@ -108,7 +108,7 @@ _LOOKS: Final[
         study.build_run_table,
     ),
 }
-# Functions that return the numbered reasons for the verdicts in a table, keyed by type of answer.
+# For each type of answer, the function that returns the numbered reasons for the verdicts in its table.
 _REASONS: Final[Mapping[str, Callable[[Any], list[tuple[str, str]]]]] = {
     "suggestion": lambda answer: suggestion.list_candidate_reasons(
         answer, answer.candidates[:_FEW_ROWS]
@@ -159,7 +159,7 @@ def _draw_suggestion(answer: PairSuggestion) -> Markup:
 def _build_starred_table(
     title: str, head: Sequence[str], rows: Sequence[Sequence[Cell]]
 ) -> Markup:
-    """Remove the column of stars from a table, and highlight the recommended row, which a star marks."""
+    """Remove the column of stars from a table, and highlight the row with a star, which is the recommended one."""
     marked = next((at for at, row in enumerate(rows) if row[0] == "*"), None)
     return build_scrolling_table(title, *remove_star_column(head, rows), marked)
 
@@ -188,7 +188,7 @@ def _build_lower_sections(
 
 
 def _build_choice(answer: PairSuggestion, title: str = "") -> Markup:
-    """Return the section above the figures: the pairs of times in large type, and remarks."""
+    """Return the section above the figures, with the pairs of times in large type and remarks."""
     cards = [_build_recommendation(answer, title)]
     better = answer.clearly_better
     if better:
@@ -651,7 +651,7 @@ def give_sentence(kind: str, answer: Any) -> str:
 
 
 def summarise_files(run: OpenedRun) -> str:
-    """Return a summary of a run's files, format, states, times and parts, as far as the files are readable."""
+    """Return a summary of a run's files, format, states, times and parts, as far as the files can be read."""
     first = run.databases[0]
     time = give_if_written(lambda: first.time if first.channels else first.part_time)
     facts = [" + ".join(database.format for database in run.databases)]

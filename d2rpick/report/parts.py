@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 # Name of a deck in a command if the user has to give it.
 _SOME_DECK: Final = "DECK"
-# Column names of the table of sets, and of the two tables into which the columns for parts are divided.
+# Column names of the table of sets, and of the two tables between which the columns for parts are divided.
 SETS = (
     "set",
     "parts",
@@ -95,7 +95,7 @@ _IN_FLIGHT: Final = row(
         "true if the standard deviation of the energy is at least 10 % of its mean",
     ),
 )
-# The fields for a part's behaviour in flight describe the longest flight.
+# The fields for the behaviour of a part in flight describe the longest flight.
 PART: Final = row(
     *keys.PART.fields,
     Field("elements", _COUNTS, "numbers of elements by kind; null without a deck"),
@@ -336,7 +336,7 @@ def build_part_table(
 def build_set_table(
     answer: Parts, names: Iterable[str] = ()
 ) -> tuple[list[str], list[list[tables.Cell]]]:
-    """Return the header and rows of a table of sets, with all or some columns; the recommended set has a star."""
+    """Return the header and rows of a table of sets, with all or some columns; a star marks the recommended set."""
     columns = {name: SET_COLUMNS[name] for name in names or SET_COLUMNS}
     return tables.fill_table(
         {"": lambda part_set: "*" if part_set.recommended else " ", **columns},
@@ -345,7 +345,7 @@ def build_set_table(
 
 
 def _format_position_error(part_set: PartSet) -> str:
-    """Return the position error of a set as text, with the underlying assumption."""
+    """Return the position error of a set as text, with the assumption on which it is based."""
     error = _format_lower_bound(part_set, part_set.position_error)
     return f"{error} if one body" if part_set.position_assumes else error
 
@@ -417,7 +417,7 @@ def list_next_step(answer: Parts, question: RepeatedQuestion) -> list[tuple[str,
 
 
 def _name_step_without_set(answer: Parts, question: RepeatedQuestion) -> str:
-    """Return the step if no set is recommended: to the deck that is missing, or to the verdict on all parts."""
+    """Return the step if no set is recommended: to the missing deck, or to the verdict on all parts."""
     # The options name a deck that was not used.
     of_files = RepeatedQuestion(files=question.files)
     if answer.inventory is None:
@@ -430,7 +430,7 @@ def _name_step_without_set(answer: Parts, question: RepeatedQuestion) -> str:
 
 
 def _explain_no_part(answer: Parts) -> str:
-    """Explain why no set was compared: no part can be switched, or this is unknown for some parts."""
+    """Explain why no set was compared: no part can be switched, or it is unknown whether some parts can."""
     unknown_rows = [row for row in answer.rows if row.verdict == "unknown"]
     if not unknown_rows:
         return "no part can be switched"
@@ -485,7 +485,7 @@ def list_page_remarks(answer: Parts) -> list[tuple[str, str]]:
 
 
 def format_count(count: int, noun: str) -> str:
-    """Return a count with its noun, in the plural unless the count is 1."""
+    """Return a count with its noun, which is plural unless the count is 1."""
     return f"{count} {noun}{'s' * (count != 1)}"
 
 

@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from d2rpick.report.formats import DisplayOptions, RepeatedQuestion, WrittenDeck
 
 
-# The run in which the parts can be switched in a window, keyed by status of the window.
+# Run in which the parts can be switched in a window, by status of the window.
 _RUN: Final = {
     "supported": "next run",
     "re-plan": "later run",
@@ -70,7 +70,7 @@ def _get_situation(row: PlannedFlight) -> Situation | None:
 
 
 def _make_margin_getter(key: str) -> Callable[[PlannedFlight], Any]:
-    """Return a function that reads a value of a window's margin; its result is None if the window is already used."""
+    """Return a function that reads a value from the margin of a window; None if the window has been used."""
     return lambda row: None if row.done else getattr(row.margin, key)
 
 
@@ -209,7 +209,7 @@ DOCUMENT: Final = Document(
 
 
 def as_table(plan: RunPlan, display: DisplayOptions) -> str:
-    """Return the plan in one sentence, the next command, one row per flight, and reasons with improvements."""
+    """Return the plan in one sentence, the next command, a row per flight, and reasons with improvements."""
     rows = ""
     if plan.flights:
         known_columns = tables.select_known_columns(*build_flight_table(plan))
@@ -368,7 +368,7 @@ def list_verdicts(plan: RunPlan) -> list[tuple[str, str]]:
 
 
 def as_markdown(plan: RunPlan, display: DisplayOptions) -> str:
-    """Return the flights as a Markdown table, with the saving and the reasons against windows below."""
+    """Return the flights as a Markdown table and, below it, the saving and the reasons against windows."""
     below = tables.format_as_list(
         (
             *list_next_steps(plan, display.question, display.written_deck),
@@ -407,7 +407,7 @@ def as_value(plan: RunPlan, display: DisplayOptions) -> str:
 
 
 def list_plan_remarks(plan: RunPlan) -> list[tuple[str, str]]:
-    """Return the rigid time sacrificed for quality, and the position errors, as (name, sentence) pairs."""
+    """Return the rigid time given up for quality, and the position errors, as (name, sentence) pairs."""
     supported = plan.supported
     lines = []
     lines += [
@@ -446,7 +446,7 @@ def _list_position_errors(plan: RunPlan) -> list[tuple[str, str]]:
 
 
 def build_flight_table(plan: RunPlan) -> tuple[list[str], list[list[tables.Cell]]]:
-    """Return the column names and cells of all flights; CPU time and position error only if they are known."""
+    """Return the column names and cells of all flights; CPU time and position error appear only if they are known."""
     placed = any(
         row.candidate and row.candidate.position_error is not None
         for row in plan.flights

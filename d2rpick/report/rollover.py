@@ -136,7 +136,7 @@ def _get_recommended_tr(answer: PairSuggestion) -> float | None:
 
 
 def _list_short_values(outcome: Outcome) -> list[tables.Cell]:
-    """Return the table cells of a run with four digits, which suffice because runs differ in the second digit."""
+    """Return the table cells of a run with four digits; they suffice, because runs differ in the second digit."""
     return [float(f"{value:.4g}") for value in RUN.plain(outcome).values()]
 
 

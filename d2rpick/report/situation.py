@@ -1,4 +1,4 @@
-"""Describe what suggest and verify have in common: history, flight, oscillator and health of the run."""
+"""Describe what ``suggest`` and ``verify`` have in common: history, flight, oscillator and health of the run."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History
 
 
-# Largest number of parts that are named in a line; the JSON output contains all parts.
+# Largest number of parts that are named in a line; the JSON output contains all of them.
 _NAMED = 5
 
 
@@ -31,7 +31,7 @@ def describe_input(history: History) -> str:
 
 
 def name_energy(history: History) -> str:
-    """Return the name of the energy; if the energy belongs to many parts, only the first of them are named."""
+    """Return the name of the energy; if it belongs to many parts, only the first of them are named."""
     parts = [part.name for part in history.parts or () if part not in history.springs]
     if len(parts) <= _NAMED:
         return history.channel
@@ -39,7 +39,7 @@ def name_energy(history: History) -> str:
 
 
 def label_energy(unit: str) -> str:
-    """Return the axis label of an internal energy, with its unit if a file names it.
+    """Return the axis label of an internal energy, with its unit if a file gives one.
 
     Examples
     --------
@@ -124,7 +124,7 @@ def _describe_basis(situation: Situation) -> str:
 
 
 def _explain_level_alone(situation: Situation) -> str:
-    """Return a note that no deformation is known, with the reason if several modes are involved."""
+    """Return a note that no deformation is known, with the reason if there are several modes."""
     if situation.at_rest:
         return "energy: nothing vibrates"
     fit = situation.evidence.fit
@@ -133,7 +133,7 @@ def _explain_level_alone(situation: Situation) -> str:
 
 
 def list_health_columns(health: Health) -> tuple[str, ...]:
-    """Return the column names of the health table. The first name contains the time up to which the run was judged."""
+    """Return the column names of the health table; the first one contains the time up to which the run was judged."""
     return (
         "health" if health.until is None else f"health up to {health.until:.6g}",
         "this run",
@@ -143,7 +143,7 @@ def list_health_columns(health: Health) -> tuple[str, ...]:
 
 
 class Measure(NamedTuple):
-    """A displayed health quantity; ``value`` and ``good`` are None if the files lack the energies needed for it."""
+    """A displayed health quantity; ``value`` and ``good`` are None if the files lack the energies that it needs."""
 
     what: str
     value: str | None
@@ -152,7 +152,7 @@ class Measure(NamedTuple):
 
 
 def list_health_measures(health: Health) -> list[Measure]:
-    """Return all health quantities of a run; those for its rigid window come last."""
+    """Return all health quantities of a run, with those for its rigid window last."""
     low = health.energy_ratio_min
     high = health.energy_ratio_max
     span = None if low is None or high is None else (low, high)

@@ -1,4 +1,4 @@
-"""Write the result of ``study`` as a table, JSON, CSV, Markdown, and the last line of newline-delimited JSON."""
+"""Write the result of ``study`` as a table, JSON, CSV, Markdown, or the last line of newline-delimited JSON."""
 
 from __future__ import annotations
 
@@ -145,7 +145,7 @@ DOCUMENT: Final = Document(
 
 
 def as_table(answer: StudyOfRuns, display: DisplayOptions) -> str:
-    """Return as text the results common to all runs, and one line per run with its shortened name."""
+    """Return, as text, the results common to all runs, and a line per run with its shortened name."""
     head, rows = tables.select_known_columns(*build_run_table(answer))
     rows = [
         [name, *row[1:]]
@@ -190,7 +190,7 @@ def as_csv(answer: StudyOfRuns, _: DisplayOptions) -> str:
 
 
 def as_ndjson(answer: StudyOfRuns, display: DisplayOptions) -> str:
-    """Return the lines of the runs that have not been written yet, and the line with the common results."""
+    """Return the lines of the runs that are not yet written, and the line with the common results."""
     return "\n".join([*display.lines, LAST.as_json(answer, display.command, None)])
 
 
@@ -240,13 +240,13 @@ def build_run_table(answer: StudyOfRuns) -> tuple[list[str], list[list[tables.Ce
 
 
 def _explain_status(row: StudyRow) -> str:
-    """Return the message of a run without the run's name; if there is none, the codes of its warnings, if any."""
+    """Return the message of a run without the name of the run or, failing that, the codes of its warnings, if any."""
     text = row.message or ", ".join(row.warnings)
     return text.removeprefix(f"{row.source.rstrip('/')}: ")
 
 
 def name_target_energy(answer: StudyOfRuns) -> str:
-    """Return the header of the target-energy column, with the unit if all runs name the same unit."""
+    """Return the header of the target-energy column, with the unit if all runs give the same unit."""
     return f"E(td) [{answer.energy_unit}]" if answer.energy_unit else "E(td)"
 
 
@@ -286,7 +286,7 @@ def _name_error(answer: StudyOfRuns) -> str:
 
 
 def _format_error_span(errors: Sequence[float]) -> str:
-    """Return the smallest and largest error as text, or a single number if both are displayed alike."""
+    """Return the smallest and largest error as text, or a single number if both look the same."""
     low = tables.format_measure(min(errors))
     high = tables.format_measure(max(errors))
     return low if low == high else f"{low} to {high}"
@@ -325,7 +325,7 @@ def _count_verdicts(answer: StudyOfRuns) -> str:
 
 
 def list_run_reasons(answer: StudyOfRuns) -> list[tuple[str, str]]:
-    """Return why the pairs of the runs are no better and how to improve them; each reason occurs once."""
+    """Return, each only once, why the pairs of the runs are no better and how to improve them."""
     causes = Counter(
         (row.verdict, row.verdict_reason, row.cure)
         for row in answer.runs
@@ -376,7 +376,7 @@ def describe_td(answer: StudyOfRuns) -> str:
 
 
 def shorten_names(sources: Sequence[str]) -> tuple[str, ...]:
-    """Return the distinctive part of each name, without the folders and file names common to all.
+    """Return the distinctive part of each name, without the folders and file names that all share.
 
     Examples
     --------

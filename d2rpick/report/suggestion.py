@@ -21,8 +21,7 @@ from d2rpick.report.decision import (
 from d2rpick.report.fields import Document, Field, many, maybe, row, write_csv
 from d2rpick.report.next_step import (
     name_step_after_refusal,
-    name_step_to_better_pair,
-    name_step_to_card,
+    name_step_with_pair,
     write_command,
 )
 from d2rpick.report.situation import list_situation_heading
@@ -35,7 +34,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.pair.decision import Decision
     from d2rpick.report.formats import DisplayOptions, RepeatedQuestion
 
-# Largest number of windows of acceptable tr that are listed on one line of text.
+# Largest number of windows of acceptable tr that a line of text lists.
 _NAMED = 4
 _WINDOW: Final = row(
     *keys.WINDOW.fields,
@@ -74,7 +73,7 @@ def _add_decisions(answer: PairSuggestion) -> list[tuple[Candidate, Decision]]:
 
 
 def _list_acceptable_windows(answer: PairSuggestion) -> list[dict[str, Any]] | None:
-    """Return the windows of acceptable tr, each marked if it contains the recommended tr."""
+    """Return the windows of acceptable tr, marking the one that contains the recommended tr."""
     tr = answer.recommended.tr if answer.recommended else None
     windows = answer.windows
     if windows is None:
@@ -119,7 +118,7 @@ DOCUMENT: Final = Document("d2rpick/suggest/1", "Answer of d2rpick suggest; time
 
 
 def as_table(answer: PairSuggestion, display: DisplayOptions) -> str:
-    """Return the verdict, its evidence, and the first candidates; a star marks the recommended row.
+    """Return the verdict, the evidence for it, and the first candidates; a star marks the recommended row.
 
     If nothing is recommended, candidates are listed only if all details are asked for.
     """
@@ -148,7 +147,7 @@ def as_table(answer: PairSuggestion, display: DisplayOptions) -> str:
 
 
 def as_markdown(answer: PairSuggestion, display: DisplayOptions) -> str:
-    """Return the verdict, the candidates as a Markdown table, and the evidence for the verdict below it."""
+    """Return the verdict, the candidates as a Markdown table and, below it, the evidence for the verdict."""
     above = tables.format_as_list(
         (*list_verdict(answer), *list_next_step(answer, display.question))
     )
@@ -173,7 +172,7 @@ def _select_shown_candidates(
 
 
 def as_csv(answer: PairSuggestion, _: DisplayOptions) -> str:
-    """Return CSV of all candidates, with one column for td and one for each JSON key except ``parts``."""
+    """Return CSV of all candidates, with a column for td and one for each JSON key except ``parts``."""
     left_out = ("notes", "parts")
     columns = [*(key for key in CANDIDATE.keys if key not in left_out), "td", "notes"]
     td = answer.situation.td
@@ -228,22 +227,15 @@ def list_evidence(answer: PairSuggestion) -> list[tuple[str, str]]:
 def list_next_step(
     answer: PairSuggestion, question: RepeatedQuestion
 ) -> list[tuple[str, str]]:
-    """Return the next command, which leads to the card of a usable pair or, if there is none, to a better pair."""
+    """Return the next command: it leads to the card of a usable pair or, failing that, to a better pair."""
     decision = answer.decision
-    situation = answer.situation
     pair = answer.recommended
     if decision is None or pair is None or decision.verdict == DO_NOT_USE:
         step = _name_step_after_refusal(answer, decision, question)
-    elif decision.better is not None:
-        step = name_step_to_better_pair(decision.better, question)
     else:
-        step = name_step_to_card(
-            situation.history,
-            situation.settings,
-            [(pair.tr, pair.td)],
-            question,
-            "suggest",
-            flying=situation.flight.by_parts,
+        times = (pair.tr, pair.td)
+        step = name_step_with_pair(
+            answer.situation, times, decision.better, question, "suggest"
         )
     return [("next", step)]
 
@@ -251,7 +243,7 @@ def list_next_step(
 def _name_step_after_refusal(
     answer: PairSuggestion, decision: Decision | None, question: RepeatedQuestion
 ) -> str:
-    """Return the step after an answer without a pair that can be used."""
+    """Return the step after an answer without a usable pair."""
     better = decision.better if decision else answer.clearly_better
     judged = answer.decision_on_better
     if decision is None and judged is not None and judged.verdict == DO_NOT_USE:
@@ -308,7 +300,7 @@ def list_alternatives(answer: PairSuggestion) -> list[tuple[str, str]]:
 
 
 def describe_position_error(best: Candidate, *, deck: bool) -> str:
-    """Describe the position error of a body at td, its cause and its assumptions; ``deck``: a deck is used."""
+    """Describe a body's position error at td, its cause and its assumptions; ``deck``: a deck is used."""
     assert best.position_error is not None
     taken = f" if {best.position_error_assumes}" if best.position_error_assumes else ""
     taken += " (`deck` shows which do)" if taken and not deck else ""
@@ -322,7 +314,7 @@ def describe_position_error(best: Candidate, *, deck: bool) -> str:
 
 
 def describe_given_up_time(answer: PairSuggestion) -> str:
-    """Describe the rigid time given up by the recommended pair of an answer with a longer one, and the reason."""
+    """Describe by how much the recommended pair of an answer is shorter than a longer pair, and why."""
     longer, chosen = answer.longer, answer.recommended
     assert longer is not None
     assert chosen is not None
@@ -389,7 +381,7 @@ def has_recommended_tr(window: AcceptableWindow, tr: float | None) -> bool:
 
 
 def as_value(answer: PairSuggestion, _: DisplayOptions) -> str:
-    """Return the recommended tr, and td if it was chosen too, with just enough digits to round-trip exactly.
+    """Return the recommended tr, and td if it was chosen as well, with the fewest digits that preserve them exactly.
 
     The text is empty if there is no recommendation.
     """
@@ -437,7 +429,7 @@ def list_candidate_reasons(
 def _number_candidate_reasons(
     answer: PairSuggestion, listed: Sequence[Candidate]
 ) -> dict[str, int]:
-    """Assign a number to each reason why a listed candidate is not rated higher."""
+    """Number the reasons why the listed candidates are not rated higher."""
     return number_reasons(map(answer.decision_on, listed))
 
 

@@ -15,13 +15,13 @@ if TYPE_CHECKING:
 
 Cell = str | float | int | bool | None
 Rows = "Iterable[Sequence[Cell]]"
-# _WORD: in a table that is too wide, words with more characters than this, such as paths, are split first.
-# _LEAST: in a table that is still too wide, words with more characters than this are split; numbers are shorter.
+# _WORD: in a table that is too wide, words longer than this number of characters (e.g. paths) are split first.
+# _LEAST: in a table that is still too wide, words longer than this are split; numbers are shorter.
 _WORD: Final = 32
 _LEAST: Final = 12
 # _NUMBER: pattern of a number, which is not treated as a spreadsheet formula.
-# _FORMULA: pattern of a spreadsheet formula, which begins with =, +, -, @ or the full-width form of one of them.
-# A formula may follow a semicolon, because some spreadsheets use semicolons to separate the cells of a CSV file.
+# _FORMULA: pattern of a spreadsheet formula, which begins with =, +, -, @ or the full-width form of one of these.
+# A formula may follow a semicolon, because some spreadsheets use it to separate the cells of a CSV file.
 _NUMBER: Final = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _FORMULA: Final = rf"(?:^|;)\s*(?=[=+\-@＝＋－＠])(?!{_NUMBER}\s*(?:;|$))"
 # Largest number of characters in a cell that is not wrapped; longer cells are wrapped before columns are omitted.
@@ -60,14 +60,14 @@ def format_if_known(value: float | None, form: str) -> str | None:
 
 
 def format_half_width(low: float | None, high: float | None) -> str | None:
-    """Return half the width of an interval as text, to follow "+-"; None if the width is unknown."""
+    """Return half the width of an interval as text, for use after "+-"; None if the width is unknown."""
     return None if low is None or high is None else f"{(high - low) / 2:.1e}"
 
 
 def select_known_columns(
     head: Sequence[str], rows: Sequence[Sequence[Cell]]
 ) -> tuple[list[str], list[list[Cell]]]:
-    """Drop the columns without known values.
+    """Drop the columns that contain only unknown values.
 
     Examples
     --------
@@ -85,7 +85,7 @@ def select_known_columns(
 def select_columns(
     head: Sequence[str], rows: Sequence[Sequence[Cell]], columns: Sequence[int]
 ) -> tuple[list[str], list[list[Cell]]]:
-    """Return the columns with these indices of a table."""
+    """Return the columns of a table with these indices."""
     selected_rows = [[row[i] for i in columns] for row in rows]
     return [head[i] for i in columns], selected_rows
 
@@ -108,7 +108,7 @@ def fill_table(
 def remove_star_column(
     head: Sequence[str], rows: Iterable[Sequence[Cell]]
 ) -> tuple[list[str], list[list[Cell]]]:
-    """Remove the first column, in which a star marks the recommendation, and replace +- with ``±`` for a page."""
+    """Remove the first column, in which a star marks the recommendation, and replace +- by ``±`` for a page."""
     return [name.replace("+-", "±") for name in head[1:]], [
         list(row[1:]) for row in rows
     ]
@@ -117,7 +117,7 @@ def remove_star_column(
 def format_in_line(
     named_texts: Iterable[tuple[str, Cell]], width: int = 0
 ) -> list[str]:
-    """Return one line per name and text, aligned at ``width`` characters, by default the length of the longest name."""
+    """Return a line per name and text, aligned at ``width`` characters (by default, the length of the longest name)."""
     lines = list(named_texts)
     width = width or max((len(name) for name, _ in lines), default=0)
     return [f"{name.ljust(width)}  {format_short(value)}" for name, value in lines]
@@ -183,7 +183,7 @@ def as_text(
 
 
 def wrap_lines(text: str, width: int) -> str:
-    r"""Wrap the lines longer than ``width``; continuation lines are indented to the text after the name.
+    r"""Wrap lines longer than ``width``; continuation lines are indented to the text after the name.
 
     Examples
     --------
@@ -199,7 +199,7 @@ def wrap_lines(text: str, width: int) -> str:
 
 
 def wrap_command(line: str, width: int) -> str:
-    r"""Wrap a command line longer than ``width`` before its options; a shell still reads the result as one command.
+    r"""Wrap a command line longer than ``width`` before its options; a shell still reads it as one command.
 
     Examples
     --------
@@ -223,7 +223,7 @@ def wrap_command(line: str, width: int) -> str:
 
 
 def _wrap_below_name(line: str, width: int) -> str:
-    """Wrap a line; indent its continuation lines to the text after the name or, without a name, like the line."""
+    """Wrap a line; its continuation lines are indented to the text after the name or, without a name, like the line."""
     from textwrap import fill
 
     name = re.match(r"\s*(?:\S+ )*?\S+  +(?=\S)|\s*", line)
@@ -240,7 +240,7 @@ def _wrap_below_name(line: str, width: int) -> str:
 def _reduce_widths(
     texts: Sequence[Sequence[str]], widths: Sequence[int], width: int
 ) -> list[int]:
-    """Reduce the widest columns until a table fits: wrap column names first, then cells, and finally split words."""
+    """Reduce the widest columns until a table fits: wrap column names first, then cells, and split words last."""
     narrowed = list(widths)
     names, *cells = (
         [min(_WORD, max(map(len, text.split()), default=1)) for text in row]
@@ -386,7 +386,7 @@ def quote_shell_line(words: Iterable[str]) -> str:
 
 
 def make_positional(names: Sequence[str]) -> tuple[str, ...]:
-    """Return names as they are typed after the options of a command, with ``--`` first if a name looks like an option.
+    """Return names as typed after the options of a command, with ``--`` first if a name looks like an option.
 
     Examples
     --------

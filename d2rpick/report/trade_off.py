@@ -16,8 +16,7 @@ from d2rpick.report.decision import (
 from d2rpick.report.fields import Document, Field, many, maybe, row, write_csv
 from d2rpick.report.next_step import (
     name_step_after_refusal,
-    name_step_to_better_pair,
-    name_step_to_card,
+    name_step_with_pair,
     write_command,
 )
 from d2rpick.report.situation import describe_input
@@ -56,9 +55,9 @@ COLUMNS: Final = [
 ]
 
 
-# Smallest relative change of the rigid time that is mentioned [-].
+# A relative change of the rigid time is mentioned if it is at least this [-].
 _NO_CHANGE: Final = 5e-4
-# Range of error ratios that are described as halving the error [-]; other ratios are given as numbers.
+# Ratios of errors in this range are described as halving the error [-]; other ratios are given as numbers.
 _HALF: Final = (0.45, 0.5)
 
 
@@ -129,7 +128,6 @@ def list_next_step(
     """Return the next command, which leads to the card of the requested or chosen pair, otherwise to a better pair."""
     offer = trade_off.requested or trade_off.recommended
     decision = trade_off.decide_on(offer) if offer else None
-    situation = trade_off.situation
     if offer is None or offer.tr is None or decision is None:
         step = f"compare all flights with {write_command(question, 'plan')}"
     elif decision.verdict == DO_NOT_USE:
@@ -137,17 +135,14 @@ def list_next_step(
         step = name_step_after_refusal(
             offer.answer.situation, decision.better, question, otherwise, decision
         )
-    elif decision.better is not None:
-        step = name_step_to_better_pair(decision.better, question)
     else:
         times = ("--td", f"{offer.td:.6g}")
-        step = name_step_to_card(
-            situation.history,
-            situation.settings,
-            [(offer.tr, offer.td)],
+        step = name_step_with_pair(
+            trade_off.situation,
+            (offer.tr, offer.td),
+            decision.better,
             question._replace(times=times),
             "suggest",
-            flying=situation.flight.by_parts,
         )
     return [("next", step)]
 
@@ -187,7 +182,7 @@ def list_other_td(trade_off: TradeOff, requested: Offer) -> tuple[str, str]:
 def _list_choice_if_td_is_free(
     trade_off: TradeOff, requested: Offer
 ) -> list[tuple[str, str]]:
-    """Return the pair that ``suggest`` chooses in the td range, unless it is the pair at the requested td."""
+    """Return the pair that ``suggest`` chooses in the td range, unless it is that of the requested td."""
     best = trade_off.recommended
     if best is None or best is requested or best.decision is None:
         return []
@@ -218,7 +213,7 @@ def list_costs_of_other_offers(trade_off: TradeOff) -> list[tuple[str, str]]:
 
 
 def _warn_about_refused(offer: Offer) -> str:
-    """Return the verdict in parentheses if the pair of an offer cannot be used; otherwise an empty string."""
+    """Return the verdict in parentheses if the pair of an offer cannot be used; otherwise ""."""
     decision = offer.decision
     refused = decision is not None and decision.verdict == DO_NOT_USE
     return f" ({DO_NOT_USE})" if refused else ""
@@ -233,7 +228,7 @@ def _describe_offer(offer: Offer) -> str:
 
 
 def _describe_error_at(offer: Offer) -> str:
-    """Return the start of a sentence that states the error of a proposed pair."""
+    """Return the beginning of a sentence that states the error of a proposed pair."""
     return f"td = {offer.td:.6g} with {_format_offer_error(offer)}"
 
 
@@ -264,7 +259,7 @@ def as_csv(trade_off: TradeOff, _: DisplayOptions) -> str:
 
 
 def give_answer(trade_off: TradeOff) -> str:
-    """Return in one sentence the pair to use, or how good the requested td is and what another td changes."""
+    """Return, in one sentence, the pair to use, or how good the requested td is and what another td changes."""
     requested = trade_off.requested
     if requested is None:
         return ": ".join(_list_verdict_of_chosen(trade_off)[0])
@@ -315,7 +310,7 @@ DOCUMENT: Final = Document("d2rpick/explore/1", "Answer of d2rpick explore; time
 
 
 def _explain_why_no_pair(trade_off: TradeOff) -> str:
-    """Explain why no td has an acceptable pair, using the td with the highest energy as an example."""
+    """Explain why no td has an acceptable pair, with the td of the highest energy as an example."""
     if not trade_off.offers:
         return "no td in the range has an admissible tr"
     highest = max(trade_off.offers, key=lambda offer: offer.energy_td)
@@ -366,7 +361,7 @@ def _format_offer_error(offer: Offer) -> str:
 
 
 def select_offers(trade_off: TradeOff, limit: int) -> list[Offer]:
-    """Return up to ``limit`` proposed pairs: those that the answer names, and evenly spaced Pareto-optimal ones."""
+    """Return up to ``limit`` proposed pairs: those that the answer names, and evenly spaced Pareto-optimal pairs."""
     named_td = {
         offer.td
         for offer in (
@@ -393,7 +388,7 @@ def select_offers(trade_off: TradeOff, limit: int) -> list[Offer]:
 def build_offer_table(
     offers: Sequence[Offer], trade_off: TradeOff
 ) -> tuple[list[str], list[list[tables.Cell]]]:
-    """Return the column names and cells of the proposed pairs; the pair of the first line of the answer has a star.
+    """Return the column names and cells of the proposed pairs; a star marks the pair in the first line of the answer.
 
     `list_offer_reasons` explains the numbers beside the verdicts.
     """
@@ -424,7 +419,7 @@ def list_offer_reasons(offers: Sequence[Offer]) -> list[tuple[str, str]]:
 
 
 def _number_offer_reasons(offers: Sequence[Offer]) -> dict[str, int]:
-    """Assign a number to each reason why a proposed pair is not rated higher."""
+    """Number the reasons why the proposed pairs are not rated higher."""
     return number_reasons(offer.decision for offer in offers if offer.decision)
 
 

@@ -18,8 +18,7 @@ from d2rpick.report.decision import (
 from d2rpick.report.fields import Document, Field, get_kind, maybe, row
 from d2rpick.report.next_step import (
     name_step_after_refusal,
-    name_step_to_better_pair,
-    name_step_to_card,
+    name_step_with_pair,
     write_command,
 )
 from d2rpick.report.situation import list_situation_heading
@@ -29,7 +28,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.switched.comparison import Comparison
     from d2rpick.report.formats import DisplayOptions
 
-# Fields of the judged pair, of its measured values, and of the verdict.
+# Fields of the judged pair, of its measured values, and of the verdict on it.
 MEASURES: Final = row(
     Field("tr", "number", get=lambda answer: answer.candidate.tr),
     Field("td", "number", get=lambda answer: answer.situation.td),
@@ -76,7 +75,7 @@ COMPARED = ("", "switched", "reference")
 
 
 def as_table(answer: PairVerdict, display: DisplayOptions) -> str:
-    """Return as text the verdict with reasons and improvements, its evidence, and the measured values of the pair."""
+    """Return, as text, the verdict with reasons and improvements, its evidence, and the measured values of the pair."""
     decided = answer.decision.reason
     remarks = [("note", reason) for reason in answer.reasons if reason not in decided]
     above = list_situation_heading(answer.situation, verbose=display.verbose)
@@ -129,17 +128,9 @@ def list_next_step(
         words = (*question.times, "--report", "verify.html")
         line = write_command(question, "verify", *words)
         step = f"use the results of the switched run; keep the comparison with {line}"
-    elif decision.better is not None:
-        step = name_step_to_better_pair(decision.better, question)
     else:
-        step = name_step_to_card(
-            situation.history,
-            situation.settings,
-            [(answer.candidate.tr, answer.td)],
-            question,
-            "card",
-            flying=situation.flight.by_parts,
-        )
+        pair = (answer.candidate.tr, answer.td)
+        step = name_step_with_pair(situation, pair, decision.better, question, "card")
     return [("next", step)]
 
 
@@ -220,7 +211,7 @@ def as_markdown(answer: PairVerdict, display: DisplayOptions) -> str:
 
 
 def list_all_measures(answer: PairVerdict) -> dict[str, Any]:
-    """Return the values of the pair, keyed by name; those of a switched run have the prefix ``switched_``."""
+    """Return the values of the pair by name; those of a switched run have the prefix ``switched_``."""
     situation = answer.situation
     measured: dict[str, Any] = {
         "energy_td": situation.energy_td,
@@ -282,7 +273,7 @@ def _format_comparison(switched: Comparison) -> list[str]:
 
 
 def _list_switched_measures(answer: PairVerdict) -> dict[str, Any]:
-    """Return the values of the switched run, keyed by name; empty if there is no switched run."""
+    """Return the values of the switched run by name; empty if there is no switched run."""
     values = SWITCHED.plain(answer.switched) if answer.switched else {}
     values = {
         name: "; ".join(value) if name == "objections" else value

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from d2rpick.flight.flight import Flight
     from d2rpick.histories.history import History, Samples
 
-# Time shown before and after the flight, as a fraction of its length [-], to make load and landing visible.
+# Time shown before and after the flight, as a fraction of its length [-], so that load and landing are visible.
 _BEYOND = 0.06
 # LOGARITHMIC: the energy axis is logarithmic if the highest energy exceeds this multiple of the target energy [-].
 # BELOW_LEVEL: ratio of the target energy to the lowest energy of a logarithmic energy axis [-].
@@ -56,7 +56,7 @@ class Scale(NamedTuple):
 def merge_windows(
     windows: Sequence[tuple[float, float]], gap: float
 ) -> list[tuple[float, float]]:
-    """Merge ascending windows with gaps shorter than ``gap`` [time], because noise produces hundreds of windows.
+    """Merge ascending windows separated by less than ``gap`` [time], because noise produces hundreds of windows.
 
     Examples
     --------
@@ -73,7 +73,7 @@ def merge_windows(
 
 
 def make_scale(low: float, high: float, level: float) -> Scale:
-    """Return the scale for values from ``low`` to ``high`` on which ``level`` is clearly visible [energy].
+    """Return a scale for values from ``low`` to ``high`` on which ``level`` is clearly visible [energy].
 
     Examples
     --------
@@ -91,7 +91,7 @@ def make_scale(low: float, high: float, level: float) -> Scale:
 def make_scale_of_flight(
     situation: Situation, view: View, levels: Sequence[float]
 ) -> Scale:
-    """Return the scale for a flight and its levels or, if there is no vibration, for the energy of the whole run."""
+    """Return the scale for a flight and its levels or, if nothing vibrates, for the energy of the whole run."""
     if situation.at_rest:
         return make_scale(
             0.0,
@@ -116,7 +116,7 @@ def make_view(
     times: list[float],
     last_known: float | None = None,
 ) -> View:
-    """Return the view of a flight and ``times`` [time]. A flight without known end lasts until ``last_known``.
+    """Return the view of a flight and ``times`` [time]. A flight without a known end lasts until ``last_known``.
 
     If no flight is known, the view is the whole record.
     """
@@ -157,7 +157,7 @@ def make_view(
 def _read_flight_energies(
     history: History, start: float, end: float, inner: tuple[float, float]
 ) -> Samples:
-    """Return the energies in the flight except near its ends, or of adjacent states if the flight has none."""
+    """Return the energies in the flight except near its ends or, if it has none, those of adjacent states."""
     margin = _UNSURE * (end - start)
     flown = history.between(start + margin, end - margin)[1]
     return flown if flown.size else history.energies_at(np.array(inner))
@@ -211,7 +211,7 @@ def replay_motion(
 
 
 class Response(NamedTuple):
-    """Response of the single oscillator that describes a record, from which the motion for any switch times follows.
+    """Response of the single oscillator that describes a record; the motion for any switch times follows from it.
 
     On an even grid of ``time`` (n,) [time], ``reference`` is the deformation without switching; ``release`` is the
     share of a released deformation that remains after the time since the first grid point.  Deformations vibrate about
@@ -226,7 +226,7 @@ class Response(NamedTuple):
 
 
 def compute_response(situation: Situation) -> Response | None:
-    """Return the response of the single oscillator that describes the record; None if there is none."""
+    """Return the response of the single oscillator that describes the record; None if there is no such oscillator."""
     mode = situation.vibration.whole.mode
     span = situation.evidence.span
     td = situation.td

@@ -133,9 +133,9 @@ EXPLANATIONS_BY_TOPIC: Final = {
     },
     "The record": {
         "coarse-record": Explanation(
-            "The fastest line of the energy, even a weak one, has fewer than 4 states per period. The verdict rests on "
-            "the strong lines. The record may hide a faster vibration, and the error after td may then be larger "
-            "than stated.",
+            "The fastest line of the energy, even a weak one, has fewer than 4 states per period. The verdict is "
+            "based on the strong lines. The record may hide a faster vibration, and the error after td may then be "
+            "larger than stated.",
             "Write the energies more often: at least ten states per period of the fastest line of the energy, which is "
             "half a period of the vibration.",
         ),
@@ -210,7 +210,8 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "Use another hourglass control or element formulation for this part, and run the model again.",
         ),
         "sliding": Explanation(
-            "The contact energy is more than 10 % of the internal energy. Only friction can explain so much.",
+            "The contact energy is more than 10 % of the internal energy. Only friction can explain so large a contact "
+            "energy.",
             "Check the contacts of the reference run for penetrations.",
         ),
         "window-not-judged": Explanation(
@@ -372,8 +373,8 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "Check whether these runs failed. Let them finish, or leave them out.",
         ),
         "repeated-runs": Explanation(
-            "Several runs of the study have the same content, so that they agree by necessity. The common tr rests on "
-            "fewer runs than the table has rows.",
+            "Several runs of the study have the same content, so they necessarily agree. The common tr is based "
+            "on fewer runs than the table has rows.",
             "Give each run once. Check whether a file was copied to the wrong folder.",
         ),
         "internal-error": Explanation(

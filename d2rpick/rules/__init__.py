@@ -22,7 +22,7 @@ from d2rpick.base.tuples import NamedTuple
 from d2rpick.deck.radioss_files import HEAD, is_radioss
 from d2rpick.deck.reader import Deck, read_deck
 from d2rpick.deck.source import SourceFile
-from d2rpick.rules import reading, runs, sets, switched_parts, times
+from d2rpick.rules import constraints, reading, runs, sets, switched_parts, times
 from d2rpick.rules.base import LS_DYNA, Case, Finding, RunCase, Severity
 from d2rpick.rules.rule import Rule
 
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from d2rpick.rules.judgement import HistoryJudge as Judge
 
 
-_MODULES = (reading, sets, times, switched_parts, runs)
+_MODULES = (reading, sets, times, switched_parts, constraints, runs)
 _ALL = (
     value
     for module in _MODULES
@@ -44,15 +44,15 @@ _ALL = (
 )
 # Prefix of the ids of the rules that need an energy history.
 _BY_HISTORY: Final = "D2R2"
-# Smallest similarity (0 to 1) between a wrong rule id and a suggested id; it permits one additional character.
+# Smallest similarity (0 to 1) between a wrong rule id and a suggested one; it allows one additional character.
 _ALIKE: Final = 0.9
-# Rules that only report consequences of a wrong unit, keyed by the rule that reports the wrong unit.
+# Rules that only report consequences of a wrong unit, by the rule that reports the wrong unit.
 _FOLLOW: Final = {
     "D2R115": {"D2R101", "D2R205", "D2R206", "D2R207"},
     "D2R207": {"D2R205", "D2R206"},
     "D2R206": {"D2R205"},
 }
-# Other rules that report the same field, such as a time after the end of the run, keyed by rule.
+# Other rules that report the same field, e.g. a time after the end of the run, by rule.
 _FOLLOW_THERE: Final = {"D2R205": {"D2R101"}}
 # Other rules that report a wrong id of the same part, keyed by rule.
 _FOLLOW_OF_PART: Final = {"D2R103": {"D2R106"}}
@@ -107,7 +107,7 @@ class Configuration(NamedTuple):
         return chosen and not (self.ignore and rule.startswith(self.ignore))
 
     def verify(self, rule_ids: Collection[str]) -> None:
-        """Raise ConfigurationError if the configuration names an unknown rule; the message names a similar rule."""
+        """Raise ConfigurationError if the configuration names an unknown rule; the message suggests a similar rule."""
         where = f"{self.source}: " if self.source else ""
         for name in (*self.select, *self.ignore, *self.severity):
             exact = name in self.severity and name not in (*self.select, *self.ignore)
@@ -134,7 +134,7 @@ def _describe_expected(name: str, rule_ids: Collection[str]) -> str:
 
 
 def _count_differences(first: str, second: str) -> int:
-    """Return how many characters of two strings of equal length differ, or the longer of two unequal lengths."""
+    """Return the number of characters in which two strings of equal length, or the longer of two, differ."""
     if len(first) != len(second):
         return max(len(first), len(second))
     return sum(a != b for a, b in zip(first, second, strict=True))
@@ -191,7 +191,7 @@ def _read_rule_names(
 
 
 class CheckedWindow(NamedTuple):
-    """A rigid window; ``place`` is the card that opens it. The window does not keep the deck in memory.
+    """A rigid window; ``place`` is the card that opens it. A window does not keep the deck in memory.
 
     ``cards`` are the numbers of the cards that open and close it; the second one is None if no card closes it.
     ``decision`` is the verdict on its pair of times; None if no history judges the pair.
@@ -231,7 +231,7 @@ class Checked(NamedTuple):
 def find_configuration(
     deck: str, override: Configuration, other_keys: Collection[str] = ()
 ) -> Configuration:
-    """Return the configuration closest to a deck; the keys of ``override`` replace the keys of this configuration.
+    """Return the configuration closest to a deck; the keys of ``override`` replace keys of this configuration.
 
     ``other_keys`` are keys that belong to other commands.
 
@@ -316,7 +316,7 @@ def check_deck(
 
 
 def _remove_consequences(findings: list[Finding]) -> list[Finding]:
-    """Remove findings that merely follow from a wrong unit or time reported by another rule."""
+    """Remove findings that only follow from a wrong unit or time reported by another rule."""
     causes = {finding.rule for finding in findings} & _FOLLOW.keys()
     follow = set[str]().union(*(_FOLLOW[rule] for rule in causes))
     reported_fields = {

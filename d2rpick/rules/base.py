@@ -1,4 +1,4 @@
-"""Define the input of a rule (a case, i.e. a deck or a Radioss run) and its output (findings)."""
+"""Define the input of a rule, a case (a deck or a Radioss run), and its output, the findings."""
 
 from __future__ import annotations
 
@@ -14,8 +14,10 @@ from d2rpick.base.tuples import NamedTuple
 from d2rpick.deck.card import CardField
 from d2rpick.deck.ls_dyna_columns import DATABASE
 from d2rpick.deck.ls_dyna_parts import (
+    DELETING_FLAGS,
     Constraint,
     DeckParts,
+    find_element_cards,
     read_constraints,
     read_parts,
     read_sections,
@@ -57,7 +59,7 @@ V = TypeVar("V")
 
 
 def group_values(pairs: Iterable[tuple[K, V]]) -> dict[K, list[V]]:
-    """Collect the values of each key, with the keys in the order of their first occurrence."""
+    """Collect the values of each key, in the order in which the keys first occur."""
     groups: dict[K, list[V]] = {}
     for key, value in pairs:
         groups.setdefault(key, []).append(value)
@@ -81,7 +83,7 @@ ERROR, WARNING, INFO = Severity
 
 
 class Finding(NamedTuple):
-    """A problem found in a deck: ``deck`` is the deck that was checked, ``file`` the file that contains the problem."""
+    """A problem found in a deck: ``deck`` is the deck that was checked, ``file`` the file with the problem."""
 
     rule: str
     severity: Severity
@@ -93,7 +95,7 @@ class Finding(NamedTuple):
 
 
 class Unreadable(NamedTuple):
-    """A deck that could not be checked, with the error; ``files`` are those files of the deck that are known."""
+    """A deck that could not be checked, with the error; ``files`` are the known files of the deck."""
 
     deck: str
     error: Exception
@@ -114,7 +116,7 @@ class Unreadable(NamedTuple):
 
 @dataclass(eq=False, repr=False)
 class Case:
-    """A deck as the input of rules; ``judge`` is given if an energy history is available for judging the windows."""
+    """A deck as the input of rules; ``judge`` is given if an energy history is available to judge the windows."""
 
     deck: Deck
     judge: HistoryJudge | None = None
@@ -141,7 +143,7 @@ class Case:
 
     @property
     def switches_itself(self) -> bool:
-        """Return True if a force or a sensor of the run switches parts, at times that the deck does not contain."""
+        """Return True if a force or a sensor of the run switches parts, at times that are not in the deck."""
         return any(
             not header.code.problem and header.code.value in (*_BY_FORCE, BY_SENSOR)
             for _, header in self.headers
@@ -197,7 +199,7 @@ class Case:
 
     @cached_property
     def forced(self) -> tuple[Forced, ...]:
-        """Return the force-controlled switches with their times in the history; empty if there is no history."""
+        """Return the switches by a force with their times in the history; empty if there is no history."""
         if self.judge is None or not any(
             header.code.value in _BY_FORCE for _, header in self.headers
         ):
@@ -214,7 +216,7 @@ class Case:
 
     @cached_property
     def by_condition(self) -> tuple[Forced, ...]:
-        """Return the switches controlled by a force or a sensor, with their windows."""
+        """Return the switches by a force or a sensor, with their windows."""
         if not self.sensed:
             return self.forced
         # Imported here to keep start-up fast.
@@ -246,10 +248,20 @@ class Case:
 
     @cached_property
     def constraints(self) -> Sequence[Constraint]:
-        """Return the nodal rigid bodies, extra nodes and joints of the deck, which may belong to a switched part."""
-        return [
-            *read_constraints(self.deck, "nodal rigid body", "extra nodes", "joint")
-        ]
+        """Return the constraints of the deck that may belong to a switched part."""
+        return [*read_constraints(self.deck, *DELETING_FLAGS)]
+
+    @cached_property
+    def parts_of_constrained_nodes(self) -> Mapping[int, set[int]]:
+        """Return all parts whose elements contain a node of a constraint, keyed by node id."""
+        cards = find_element_cards(self.deck, searched=True) if self.constraints else ()
+        if not cards:
+            return {}
+        # Imported here to keep start-up fast.
+        from d2rpick.deck.ls_dyna_inventory import find_parts_of_nodes
+
+        nodes = (constraint.nodes for constraint in self.constraints)
+        return find_parts_of_nodes(cards, frozenset[int]().union(*nodes))
 
     @cached_property
     def made_rigid(self) -> tuple[SwitchEvent, ...]:
@@ -267,7 +279,7 @@ class Case:
 
     @cached_property
     def end_time(self) -> Value[float] | None:
-        """Return ENDTIM as written in the deck; the last of several definitions is used."""
+        """Return ENDTIM as written in the deck; the last of several definitions applies."""
         return next(
             (
                 value
@@ -303,7 +315,7 @@ class Case:
 
     @cached_property
     def unturned(self) -> Mapping[int, str]:
-        """Return the formulation of solid parts whose stresses do not rotate with a rigid body, keyed by part id."""
+        """Return the formulation of solid parts whose stresses do not rotate with a rigid body, by part id."""
         sections = read_sections(self.deck)
         part_sections = (
             (part, sections.get(number)) for part, number in self.parts.sections.items()
@@ -316,7 +328,7 @@ class Case:
 
     @cached_property
     def unswitchable(self) -> Mapping[int, Unswitchable]:
-        """Return the parts that must not be switched, with the reasons, keyed by part id."""
+        """Return the parts that must not be switched, with the reasons, by part id."""
         # Imported here to keep start-up fast.
         from d2rpick.deck.unswitchable import find_unswitchable_in_ls_dyna
 
@@ -419,7 +431,7 @@ class RunCase(Case):
 
     @property
     def switching(self) -> int:
-        """Return the total number of switching cards in engine runs, bodies with a sensor, and rigid parts."""
+        """Return the number of all switching cards: those in engine runs, bodies with a sensor, and rigid parts."""
         bodies = self.run.starter.bodies if self.run.starter else ()
         return len(self.sets) + sum(bool(body.sensor or body.part) for body in bodies)
 
@@ -477,7 +489,7 @@ class RunCase(Case):
 
     @cached_property
     def flaws(self) -> tuple[Flaw, ...]:
-        """Return the harmful effects of starter cards on the nodes of the bodies that the engine files switch."""
+        """Return how cards of the starter deck harm nodes of the bodies that the engine files switch."""
         if not self.run.named or not self.run.pushed:
             return ()
         # Imported here to keep start-up fast.

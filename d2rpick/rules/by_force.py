@@ -1,4 +1,4 @@
-"""Evaluate switches controlled by a contact or rigid-wall force, with a history that shows when this force acts.
+"""Evaluate switches by a contact or rigid-wall force with a history that shows when this force acts.
 
 Forces that the solver wrote show when each contact and wall acts.  Momenta show that a force acts on a part, not which
 contact exerts it: with momenta alone a deck with several contacts and walls is not judged.
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     Spans = tuple[tuple[float, float], ...]  # Start and end of each time span [time].
 
-# For each CODE: what exerts the force, and True if the set waits for the force to begin, False if to end.
+# For each CODE: what exerts the force, and True if the set waits until the force begins, False if it ends.
 _CODES: Final = {
     1: ("rigid wall", False),
     2: ("contact", False),
@@ -34,14 +34,14 @@ _KEYWORDS: Final[Mapping[str, Literal["CONTACT", "RIGIDWALL"]]] = {
     "contact": "CONTACT",
     "rigid wall": "RIGIDWALL",
 }
-# If TIME2 is at least this, there is no latest switching time.
+# From this TIME2 on, there is no latest switching time.
 _NEVER: Final = 1e20
-# Longest window that is treated as chatter instead of a flight, as a fraction of the longest window [-].
+# A window up to this fraction of the longest window is treated as chatter instead of a flight [-].
 _SHORT: Final = 0.1
 
 
 class Forced(NamedTuple):
-    """A force-controlled switch, or a pair of switches: its windows in the history, and the spans of the force [time].
+    """A switch by a force, or a pair of switches: its windows in the history, and the spans of the force [time].
 
     ``place`` is the card that makes the parts rigid, ``cards`` are the cards of the pair.  ``wait`` is the name of the
     time that delays the next switch (TIME3, or Tdelay of the sensor).  ``source`` names what shows the contacts.
@@ -69,7 +69,7 @@ class Forced(NamedTuple):
 
     @property
     def lasting(self) -> list[tuple[float, float]]:
-        """Return the windows that are not chatter; a window without an end gets the end infinity."""
+        """Return the windows that are not chatter. A window without an end lasts until infinity."""
         closed = [(tr, math.inf if td is None else td) for tr, td in self.times]
         longest = max((td - tr for tr, td in closed if td < math.inf), default=0.0)
         return [(tr, td) for tr, td in closed if td - tr >= _SHORT * longest]
@@ -138,7 +138,7 @@ def follow_forced_switches(
 def _see_contacts(
     deck: Deck, card: SwitchSet, unit: Unit, judge: HistoryJudge
 ) -> _Seen | None:
-    """Return the contact spans for a set: from written forces, or from part momenta if the deck has only one contact.
+    """Return the contact spans for a set from written forces or, if the deck has only one contact, from part momenta.
 
     For a set with OFFSET a contact begins earlier, by the time to fly this distance.  None if the history does not show
     the contacts, and for a contact whose force triggers no switch (D2R008).
@@ -208,7 +208,7 @@ def _has_one_force(deck: Deck) -> bool:
 
 
 def _read_waiting(card: SwitchSet) -> ForceSwitch | None:
-    """Return the conditions of a switch set; None if it does not wait for a force, or has an unreadable field."""
+    """Return the conditions of a switch set; None if it does not wait for a force or has an unreadable field."""
     header = card.header
     factor = card.card.transform.time
     if header is None or header.code.value not in _CODES or not card.switched:

@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History
     from d2rpick.histories.opening import OpenedRun, Selection
 
-# Codes of those warnings of ``verify`` that the check repeats because no rule reports the problem.
+# Codes of those ``verify`` warnings that the check repeats because no rule reports the problem.
 _KEPT: Final = (
     "truncated-input",
     "no-free-flight",
@@ -68,7 +68,7 @@ class Fault(NamedTuple):
 
 
 class Judgement(NamedTuple):
-    """The objections to a window, and the verdict on its pair (None if the history does not suffice for one)."""
+    """The objections to a window, and the verdict on its pair (None if the history does not suffice for a verdict)."""
 
     faults: tuple[Fault, ...] = ()
     decision: Decision | None = None
@@ -76,7 +76,7 @@ class Judgement(NamedTuple):
 
 @dataclass
 class HistoryJudge:
-    """Judges windows by the energy of the switched parts in a reference run, or of the model if part data are missing.
+    """Judges windows by the energy of the switched parts in a reference run or, without part data, that of the model.
 
     The parts that are switched together are judged together, as ``suggest`` chooses one pair of times for them.
 
@@ -95,7 +95,7 @@ class HistoryJudge:
     _cautions: dict[Caution, list[int]] = field(default_factory=dict)
 
     def use_deck(self, deck: str) -> None:
-        """Use the supports, gravity and joints of a deck for the next judgements; none are known if it has no parts."""
+        """Use the supports, gravity and joints of a deck for the next judgements; without parts, none are known."""
         try:
             inventory = read_inventory(deck)
         except DeckError:
@@ -145,7 +145,7 @@ class HistoryJudge:
     def judge(
         self, window: SwitchWindow, together: Iterable[int], *, by_force: bool = False
     ) -> Judgement:
-        """Judge a window. If td is missing or not later than tr, only tr is judged.
+        """Judge a window. If td is missing or not later than tr, judge only tr.
 
         ``together`` are the parts that are switched at the same times.  One that a force switches (``by_force``) is
         judged between states of the history.
@@ -192,12 +192,12 @@ class HistoryJudge:
     def contacts(
         self, parts: Collection[int]
     ) -> tuple[tuple[float, float], ...] | None:
-        """Find the spans [time] in which contact forces act on the given parts from their momenta; None if unknown."""
+        """Find the spans [time] in which contact forces act on the given parts, from their momenta; None if unknown."""
         contact_times = self.pushed(parts)
         return contact_times and contact_times.spans
 
     def pushed(self, parts: Collection[int]) -> ContactTimes | None:
-        """Return the time spans returned by `contacts`, and their uncertainty [time]."""
+        """Return the time spans that `contacts` returns, and their uncertainty [time]."""
         chosen = [part for part in self.run.parts if part.id in parts]
         if chosen:
             momenta = next(
@@ -215,7 +215,7 @@ class HistoryJudge:
     def find_force_spans(
         self, kind: str, number: int, least: float = 0.0
     ) -> tuple[tuple[float, float], ...] | None:
-        """Return the spans in which the force of a contact, interface or wall acts [time]; None if no file has it.
+        """Return the spans in which the force of a contact, interface or wall acts [time]; None if no file contains it.
 
         ``least``: only a force above it counts [force].
         """
@@ -256,7 +256,7 @@ class HistoryJudge:
 def _find_times_outside(
     history: History, tr: float, td: float | None
 ) -> Iterator[Fault]:
-    """Yield objections to times outside the history, and to a td that seems to be in a different unit."""
+    """Yield objections to times outside the history, and to a td that seems to have a different unit."""
     first = history.start
     last = history.end
     named_times = [("tr", tr)] if td is None else [("tr", tr), ("td", td)]
@@ -352,7 +352,7 @@ def _judge_error(verdict: PairVerdict) -> Iterator[Fault]:
     situation = verdict.situation
     tolerance = situation.most_error
     if situation.at_rest:
-        # If nothing vibrates, the energy is the same at any tr as at td, apart from rounding.
+        # If nothing vibrates, the energy at td equals that at any tr, apart from rounding.
         return
     if candidate.sign_match is False:
         quantity = "the deformations at tr and td have opposite directions"
@@ -386,7 +386,7 @@ def _judge_limits(verdict: PairVerdict) -> Iterator[Fault]:
 
 
 def _suggest_cure(verdict: PairVerdict) -> str:
-    """Suggest a tr that suits this td, or a better pair, or where to look for one.
+    """Suggest a tr that suits this td, a better pair, or where to look for one.
 
     A td at which most of the vibration energy is lost has no suitable tr, so that D2R203 and this cure name one pair.
     """

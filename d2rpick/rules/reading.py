@@ -441,7 +441,7 @@ def _report_missing_parts(case: Case) -> Iterator[Objection]:
 
 
 def _describe_course(sensed: Sensed) -> str:
-    """Describe when a sensor control is on, or why that is unknown."""
+    """Describe when a sensor control is on, or why this is unknown."""
     if sensed.unknown:
         return f", by {sensed.unknown}; not judged by time"
     changes = sensed.changes

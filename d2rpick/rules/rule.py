@@ -1,4 +1,4 @@
-"""Define what the ``check`` rules are made of: the `Rule` type, its decorators, and deck fragments for the examples."""
+"""Define what the ``check`` rules are made of: the `Rule` type, its decorators, and deck fragments for examples."""
 
 from __future__ import annotations
 
@@ -157,7 +157,7 @@ def write_starter_deck(group: str = GROUP, more: str = "") -> str:
 def write_engine_files(
     *legs: tuple[str, str], cap: str = "1e-5 1e-5", node: str = "1808"
 ) -> dict[str, str]:
-    """Return engine files with the given end times and /RBODY cards (ON, OFF or none), keyed by file name."""
+    """Return engine files with the given end times and /RBODY cards (ON, OFF or none), by file name."""
     files = {}
     for number, (stop, state) in enumerate(legs, start=1):
         limit = f"/DTIX\n{cap}\n" if state == "ON" and cap else ""
@@ -201,5 +201,5 @@ def set_passing(*examples: Example) -> Callable[[Rule], Rule]:
 
 
 def set_failing(*examples: Example) -> Callable[[Rule], Rule]:
-    """Return a decorator that sets the decks that must fail a rule."""
+    """Return a decorator that sets the decks in which a rule must find a problem."""
     return lambda rule: rule._replace(failing=examples)

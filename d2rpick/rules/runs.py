@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 # Largest time step, as a fraction of the rigid window [-]; the parts are released up to one time step late.
 _MOST_CAP = 0.01
-_MOST_LISTED = 8  # Largest number of main nodes listed in a message.
+_MOST_LISTED = 8  # Largest number of main nodes that a message lists.
 
 _MIXED: Final = {
     name: text.replace("VERS/2022", "VERS/2019") if "0002" in name else text
@@ -42,7 +42,7 @@ _KEEPS: Final = (
     .partition("/GRNOD")[0]
     .replace("         7\n", "         7         1\n")
 )  # Starter deck with a rigid body for which Ikrem is 1.
-# Arguments of `d2rpick replay` for a matsum history in which the third part alone deforms.
+# Arguments of `d2rpick replay` for a matsum history in which only the third part deforms.
 _SPRING: Final = "--stiffness 660e3 --mass 31.4 --beta 2 --alpha 50 --v0 6 --t-end 0.3 --dt 1e-3 --write-as matsum"
 
 
@@ -108,7 +108,7 @@ def _make_wheel_run(
 
 
 def _find_switching_legs(case: RunCase) -> list[RadiossLeg]:
-    """Return the engine runs if any of them switches a body, otherwise an empty sequence."""
+    """Return the engine runs if any of them switches a body; otherwise an empty sequence."""
     return case.run.legs if any(leg.switched for leg in case.run.legs) else []
 
 
@@ -378,7 +378,7 @@ def _check_versions(case: RunCase) -> Iterator[Objection]:
 
 
 def _report_flaws(case: RunCase, *, code: str) -> Iterator[Objection]:
-    """Yield those flaws of the run that have the given code."""
+    """Yield the flaws of the run that have the given code."""
     for flaw in case.flaws:
         if flaw.code == code:
             yield flaw.place, flaw.message

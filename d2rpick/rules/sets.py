@@ -130,7 +130,7 @@ def _check_pairs(case: Case) -> Iterator[Objection]:
         ):
             problem = f"RELSW names set {header.relsw.value}, which no card defines"
         if not problem and header.relsw.value and partner is not None:
-            # A problem that concerns both sets is reported at only one of them.
+            # A problem of two sets is reported at only one of them.
             first = header.swset.value < partner.swset.value
             if partner.relsw.value != header.swset.value or partner is header:
                 problem = f"RELSW names set {header.relsw.value}, which names set {partner.relsw.value}"
@@ -448,7 +448,7 @@ def _check_entity_named(case: Case) -> Iterator[Objection]:
 
 def _make_landing_deck(wait: str) -> Example:
     """Return a deck with a pair of sets, and the history of the landing box; ``wait`` is TIME3."""
-    # ENDTIM of this deck is that of the history.
+    # The deck has the ENDTIM of the history.
     landed = _make_delayed_deck(wait).deck.replace("       0.2", "       0.7", 1)
     return Example(landed, history=_LANDING, computed_by="rollover")
 

@@ -1,10 +1,10 @@
-"""Define rules D2R103-104, D2R106-108, D2R112-113 and D2R116-120 on switched parts and their attachments."""
+"""Define rules D2R103-104, D2R106-108 and D2R116-119 on switched parts."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
-from d2rpick.base.errors import choose_verb, name_units
+from d2rpick.base.errors import name_units
 from d2rpick.base.graph import find_reachable
 from d2rpick.deck.ls_dyna_parts import DeckParts, find_element_cards
 from d2rpick.rules.base import BOTH, ERROR, INFO, WARNING, Case, Objection, group_values
@@ -21,10 +21,9 @@ from d2rpick.rules.rule import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Iterable, Iterator, Mapping
 
     from d2rpick.deck.card import CardField
-    from d2rpick.deck.ls_dyna_parts import Constraint
     from d2rpick.deck.switching import Switched, SwitchEvent, SwitchSet, Unit
 
 _NEAREST = 3  # Largest number of part ids that are suggested for an unknown id.
@@ -37,22 +36,7 @@ _TOUCHING = """\
        2       2       3       4       5       6
 """
 
-_DELETED = 1  # Value of NRBF or NCSF with which a card deletes constraints.
-_MESH: Final = "*ELEMENT_SHELL\n       1       1       1       2       3       4\n"
-_SET: Final = "*SET_NODE_LIST\n         5\n         3         4        99\n"
-_NODAL: Final = "*CONSTRAINED_NODAL_RIGID_BODY\n         9         0         5\n"
-_EXTRA: Final = "*CONSTRAINED_EXTRA_NODES_NODE\n         8         3\n"
-_JOINT: Final = (
-    "*CONSTRAINED_JOINT_REVOLUTE\n"
-    + "".join(f"{node:10d}" for node in (3, 3, 50, 51, 52, 53))
-    + "\n"
-)
-_COUNTS: Final = "         0         0         0       0.0         1         0"
 _RESTART: Final = "*RIGID_DEFORMABLE_D2R\n{:10d}\n*RIGID_DEFORMABLE_R2D\n{:10d}\n"
-_TWO: Final = _MESH + "       2       2       5       6       7       8\n"
-_JOINING: Final = (
-    "*SET_NODE_LIST\n         5\n         3         6        99\n" + _NODAL
-)
 
 
 def _make_touching_deck(*lines: str) -> Example:
@@ -76,12 +60,6 @@ _LAYERS, _BEAMS = (
         ),
     )
 )
-
-
-def _make_constrained_deck(text: str, flags: str = "         0         0") -> Example:
-    """Return a deck with a constraint on a node of part 1; ``flags`` are the values of NRBF and NCSF on its card."""
-    rigid_card = THERE.replace(_COUNTS, flags + _COUNTS[20:])
-    return make_deck(_MESH + _SET + text + rigid_card + BACK)
 
 
 def _make_solid_deck(elform: str, tr: str = "0.02") -> Example:
@@ -256,7 +234,7 @@ def _list_nearest(number: int, parts: DeckParts) -> str:
 
 
 def _find_absent(line: Switched, parts: DeckParts) -> Iterator[tuple[str, int]]:
-    """Yield the kind and id of each part set, part or lead part that a line names and the deck does not define."""
+    """Yield the kind and id of each part set, part or lead part that is named on a line but not defined in the deck."""
     if line.by_set and not line.part.problem:
         yield from (
             ("part set", set_id)
@@ -309,7 +287,7 @@ def _check_shared_nodes(case: Case) -> Iterator[Objection]:
     first = {event.unit.id: event for event in reversed(case.made_rigid)}
     if len(first) < 2:
         return
-    bodies = _find_bodies(first)
+    bodies = find_lead_parts(first)
     cards = find_element_cards(case.deck, searched=True)
     if len(set(bodies.values())) < 2 or not cards:
         return
@@ -328,8 +306,8 @@ def _check_shared_nodes(case: Case) -> Iterator[Objection]:
             yield field, f"{problem}; merge them: LRB {low} on the line of {high_name}"
 
 
-def _find_bodies(first: Mapping[int, SwitchEvent]) -> dict[int, int]:
-    """Return the lead part of the rigid body of each part in ``first``, keyed by part id.
+def find_lead_parts(first: Mapping[int, SwitchEvent]) -> dict[int, int]:
+    """Return the lead part of the rigid body of each part in ``first``, by part id.
 
     The lead part is the end of the chain of LRB entries.  A part that is not merged leads itself.
     """
@@ -358,115 +336,6 @@ def _is_rigid_together(case: Case, first: Unit, second: Unit) -> bool:
         for unit in (first, second)
     }
     return any(a < d and c < b for a, b in spans[first] for c, d in spans[second])
-
-
-def _find_active_constraints(case: Case, *, nodal: bool) -> Iterator[Objection]:
-    """Yield constraints on parts that a card makes rigid without deleting these constraints."""
-    switched = _find_left_active(case, nodal=nodal)
-    constraints = [
-        constraint
-        for constraint in (case.constraints if switched else ())
-        if (constraint.kind == "nodal rigid body") == nodal
-    ]
-    owner = _find_owners(case, switched) if constraints else {}
-    parts_of_nodes = _find_parts_of_nodes(case, constraints) if nodal else {}
-    parts_made_rigid = {event.unit.id for event in case.made_rigid}
-    for constraint in constraints:
-        part_of_nodes = (
-            owner[node] for node in sorted(constraint.nodes) if node in owner
-        )
-        part = next(part_of_nodes, None)
-        if constraint.part in switched:
-            part = constraint.part
-        if part is None:
-            continue
-        if constraint.id:
-            name = f"{constraint.kind} {constraint.id}"
-        else:
-            name = constraint.kind
-        flag = f"{'NRBF' if nodal else 'NRBF and NCSF'} {switched[part].nrbf}"
-        problem = f"{name} on part {part}, which is made rigid at {switched[part].place.at} with {flag}"
-        held_parts = _find_held_parts(constraint, parts_of_nodes)
-        if unswitched_parts := held_parts - parts_made_rigid:
-            held = f"it also holds {name_units(unswitched_parts)}, so do not delete it"
-            cure = f"{held} (D2R120): make all its parts rigid, or none of them"
-        else:
-            cure = "set the flag to 1 there and to 2 on the card that switches back"
-        yield constraint.place, f"{problem}, so it stays active; {cure}"
-
-
-def _find_parts_of_nodes(
-    case: Case, constraints: Sequence[Constraint]
-) -> dict[int, set[int]]:
-    """Return all parts whose elements contain a node of the constraints, keyed by node id."""
-    cards = find_element_cards(case.deck, searched=True) if constraints else ()
-    if not cards:
-        return {}
-    # Imported here to keep start-up fast.
-    from d2rpick.deck.ls_dyna_inventory import find_parts_of_nodes
-
-    nodes = frozenset[int]().union(*(constraint.nodes for constraint in constraints))
-    return find_parts_of_nodes(cards, nodes)
-
-
-def _find_held_parts(
-    constraint: Constraint, parts_of_nodes: Mapping[int, Collection[int]]
-) -> set[int]:
-    """Return the parts that contain a node of a constraint."""
-    return set[int]().union(
-        *(parts_of_nodes.get(node, ()) for node in constraint.nodes)
-    )
-
-
-def _find_owners(case: Case, parts: Collection[int]) -> dict[int, int]:
-    """Return the first of ``parts`` to which each node belongs, keyed by node id."""
-    cards = find_element_cards(case.deck, searched=True)
-    if not cards:
-        return {}
-    # Imported here to keep start-up fast.
-    from d2rpick.deck.ls_dyna_inventory import find_first_parts
-
-    return find_first_parts(cards, parts)
-
-
-class _Flags(NamedTuple):
-    """The flags NRBF and NCSF on a card that makes parts rigid, and the field of the first flag."""
-
-    nrbf: int
-    ncsf: int
-    place: CardField
-
-
-def _find_flags(case: Case, card: SwitchSet) -> _Flags | None:
-    """Return the flags of a card; restarts have them on *RIGID_DEFORMABLE_CONTROL, and plain cards have no flags."""
-    if card.header:
-        nrbf = card.header.nrbf
-        ncsf = card.header.ncsf
-        return _Flags(nrbf.value, ncsf.value, nrbf.field)
-    if card.kind != "restart":
-        return None
-    controls = (
-        control
-        for control in case.sets
-        if control.card.file == card.card.file
-        and control.card.name.endswith("_CONTROL")
-    )
-    values = next((control.values for control in controls if control.values), None)
-    if values is None:
-        return _Flags(0, 0, card.card.here)
-    nrbf_value = values[0].value
-    ncsf_value = values[1].value
-    return _Flags(int(nrbf_value), int(ncsf_value), values[0].field)
-
-
-def _find_left_active(case: Case, *, nodal: bool) -> dict[int, _Flags]:
-    """Return the flags of the first card that makes a part rigid and keeps its constraints, keyed by part id."""
-    first_flags: dict[int, _Flags] = {}
-    for event in case.made_rigid:
-        flags = _find_flags(case, event.by)
-        if flags and flags.nrbf != _DELETED and (nodal or flags.ncsf != _DELETED):
-            first_flags.setdefault(event.unit.id, flags)
-    return first_flags
 
 
 @set_passing(PASS, _make_solid_deck("0"), _make_solid_deck("2", "0.0"))
@@ -570,104 +439,3 @@ def _check_reference_laws(case: Case) -> Iterator[Objection]:
     Fix: Keep the part deformable, or compare its stress after td with the reference run.
     """
     return _report_unswitchable(case, flows=False)
-
-
-@set_passing(
-    PASS,
-    _make_constrained_deck(_NODAL, "         1         0"),
-    _make_constrained_deck(_NODAL.replace("   5\n", "   6\n")),
-)
-@set_failing(
-    _make_constrained_deck(_NODAL),
-    _make_constrained_deck(_NODAL, "         2         1"),
-)
-@make_rule_decorator(
-    "D2R112", ERROR, "a nodal rigid body on a switched part stays active (NRBF)"
-)
-def _check_nodal_bodies(case: Case) -> Iterator[Objection]:
-    """A node cannot belong to two rigid bodies. The card that makes a part rigid must delete the nodal rigid bodies on
-    it, and the card that switches back must activate them again. Otherwise the run stops (Error 30164, as a public drop
-    tool reports). Source: vendor keyword data for NRBF, according to which such bodies cause instabilities.
-
-    Fix: Set NRBF to 1 on the card that makes the part rigid and to 2 on the card that switches it back. If the body
-    also holds a part that stays deformable, do not delete it (D2R120): switch both parts, or neither.
-    """
-    return _find_active_constraints(case, nodal=True)
-
-
-def _make_joined_deck(*lines: str) -> Example:
-    """Return a deck in which a nodal rigid body joins two parts; ``lines`` are the D2R lines of the first card."""
-    rigid_card = write_automatic_card(1, "0.02", rigid=lines)
-    back_card = write_automatic_card(2, "0.09", deformable=["1", "2"][: len(lines)])
-    deleting = rigid_card.replace(_COUNTS[:40], f"{1:10d}{_COUNTS[10:40]}", 1)
-    activating = back_card.replace(_COUNTS[:40], f"{2:10d}{_COUNTS[10:40]}", 1)
-    return make_deck(_TWO + _JOINING + deleting + activating)
-
-
-@set_passing(PASS, _make_joined_deck("1", "         2         1      PART"))
-@set_failing(_make_joined_deck("1", "2"), _make_joined_deck("1"))
-@make_rule_decorator(
-    "D2R120", ERROR, "a deleted nodal rigid body (NRBF 1) that joins separate bodies"
-)
-def _check_separated_parts(case: Case) -> Iterator[Objection]:
-    """While NRBF 1 deletes a nodal rigid body, only the rigid body of its parts connects them. The parts that it joins
-    separate if they become several rigid bodies, or if one of them is not switched. Source: vendor keyword data for
-    NRBF and LRB.
-
-    Fix: Switch all parts of the body and merge them by LRB, or switch none of them.
-    """
-    deleting = [
-        event
-        for event in case.made_rigid
-        if (flags := _find_flags(case, event.by)) and flags.nrbf == _DELETED
-    ]
-    joining = [
-        constraint
-        for constraint in (case.constraints if deleting else ())
-        if constraint.kind == "nodal rigid body"
-    ]
-    bodies = _find_bodies({event.unit.id: event for event in reversed(deleting)})
-    parts_of_nodes = _find_parts_of_nodes(case, joining)
-    for constraint in joining:
-        parts = _find_held_parts(constraint, parts_of_nodes)
-        switched = parts & bodies.keys()
-        if not switched or len({bodies.get(part) for part in parts}) == 1:
-            continue
-        problem = f"nodal rigid body {constraint.id} joins {name_units(parts)} and is deleted (NRBF 1)"
-        if unswitched_parts := parts - switched:
-            verb = choose_verb(unswitched_parts)
-            yield (
-                constraint.place,
-                f"{problem}, but {name_units(unswitched_parts)} {verb} not made rigid; switch all",
-            )
-        else:
-            yield (
-                constraint.place,
-                f"{problem}, but they become separate rigid bodies; merge them by LRB",
-            )
-
-
-@set_passing(
-    PASS,
-    _make_constrained_deck(_EXTRA, "         0         1"),
-    _make_constrained_deck(_JOINT, "         1         0"),
-)
-@set_failing(
-    _make_constrained_deck(_EXTRA),
-    _make_constrained_deck(_JOINT),
-    _make_constrained_deck(_EXTRA.replace("  8  ", "  1  ")),
-)
-@make_rule_decorator(
-    "D2R113",
-    WARNING,
-    "extra nodes or a joint on a switched part stay active (NRBF, NCSF)",
-)
-def _check_extra_nodes(case: Case) -> Iterator[Objection]:
-    """Extra nodes and joints attach nodes to a rigid body. On a part that a card makes rigid, these nodes belong to two
-    rigid bodies. According to the vendor, such constraints must be deleted on switched parts, and activated again when
-    the parts are switched back. No available source confirms whether NRBF or NCSF does this for joints and extra nodes.
-    So NRBF 1 or NCSF 1 satisfies this rule.
-
-    Fix: Set NRBF and NCSF to 1 on the card that makes the part rigid and to 2 on the card that switches it back.
-    """
-    return _find_active_constraints(case, nodal=False)

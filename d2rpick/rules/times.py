@@ -36,9 +36,9 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
 
-# Smallest number of output intervals in a rigid window; they resolve crossings to within 0.5 % of the window.
+# Smallest number of output intervals in a rigid window, which resolves crossings to within 0.5 % of the window.
 _INTERVALS = 200
-# If an output interval exceeds its limit by at most this fraction, the difference is attributed to rounding [-].
+# If an output interval exceeds its limit by at most this fraction, the excess is attributed to rounding [-].
 _ROUNDING = 1e-9
 _DATABASES: Final = ("DATABASE_GLSTAT", "DATABASE_MATSUM")
 
@@ -50,7 +50,7 @@ _SECOND: Final = write_automatic_card(3, "0.1", rigid=["2"]) + write_automatic_c
     4, "0.1", deformable=["2"]
 )
 
-_DECADES = 3.0  # Powers of ten between adjacent time units
+_DECADES = 3.0  # Powers of ten between adjacent time units.
 # Tolerance for the ratio of end times, as a power of ten [-]; a reference run may be half as long as the run.
 _NEAR = math.log10(2)
 _HISTORY: Final = (
@@ -110,7 +110,7 @@ def _check_times_in_run(case: Case) -> Iterator[Objection]:
 def _group_closed_windows(
     case: Case,
 ) -> dict[tuple[SwitchSet, SwitchSet], list[SwitchWindow]]:
-    """Return the windows that have both ends, keyed by the cards that open and close them."""
+    """Return the windows that have both ends, by the cards that open and close them."""
     return group_values(
         ((window.opened.by, window.closed.by), window)
         for window in case.windows.windows
@@ -281,7 +281,7 @@ def _check_equal_times(case: Case) -> Iterator[Objection]:
 
 
 def _find_mixed_units(times: list[float], end: float, run_end: str) -> str | None:
-    """Return a message if only times multiplied by 1000 or 1/1000 would fit a run up to ``end``, otherwise None.
+    """Return a message if only times multiplied by 1000 or 1/1000 would fit a run up to ``end``; otherwise None.
 
     ``run_end`` names the end in the message. Times at or before the start of the run fit in any unit.
     """
@@ -344,7 +344,7 @@ _PASSING: Final = (_make_pair_deck(*_GOOD_PAIR),)
 
 
 def _report_faults(case: Case, rule_id: str) -> Iterator[Objection]:
-    """Yield the problems of one rule in the energy history; parts on the same card share a problem."""
+    """Yield the problems that one rule finds in the energy history; parts on the same card share a problem."""
     objections: list[tuple[tuple[SwitchSet, str, str], int]] = []
     for judged_window, judgement in case.judgements:
         for fault in judgement.faults:

@@ -1,4 +1,4 @@
-"""Check, before a first run is computed, that the run will be able to switch its parts."""
+"""Check, before the first run of a deck is computed, that the run will be able to switch its parts."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ NO_CONTACT: Final = (
 
 
 def refuse_held(path: str, inventory: Inventory, parts: Collection[int]) -> None:
-    """Raise DeckError if a support holds one of the parts; a support force is not a contact force."""
+    """Raise DeckError if a support holds one of the parts, because a support force is not a contact force."""
     if unknown := sorted(set(parts) - inventory.nodes_by_part.keys()):
         raise DeckError(
             f"{path}: {name_units(unknown)}: no elements in the deck; name others"

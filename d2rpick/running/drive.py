@@ -43,7 +43,7 @@ JOURNAL: Final = "drive.ndjson"
 # Largest time step of a rigid engine run, relative to the mean time step of the deformable engine runs [-].
 # With this time step, a rigid engine run costs a few percent of a deformable one and still resolves contacts.
 _STEP_RATIO: Final = 5.0
-# A flight too short to be switched is reported if it lasts at least this fraction of the required time [-].
+# A flight too short to be switched is reported if it lasts for at least this fraction of the required time [-].
 _REPORTED: Final = 0.5
 # _PAUSE: time between two checks of the solver [s].
 # _SILENT: time without solver output after which the driver reports this silence [s].
@@ -79,7 +79,7 @@ class Driven:
 class Driver:
     """Computes one run in its folder, continuing after the last record of its journal.
 
-    ``told`` is called with each event, in one line.  ``at`` is the leg that is being computed.
+    ``report`` is called with each event, in one line.  ``at`` is the leg that is being computed.
     """
 
     deck: DrivenDeck
@@ -87,11 +87,11 @@ class Driver:
     journal: Journal
     limits: Limits
     looks: Looks
-    told: Callable[[str], None]
+    report: Callable[[str], None]
     at: Order | None = None
 
     def prepare(self) -> None:
-        """Copy the deck into the folder and run the starter, unless an earlier driver has already done this.
+        """Copy the deck into the folder and run the starter, unless an earlier driver has done this.
 
         Raises
         ------
@@ -101,7 +101,7 @@ class Driver:
         self._wait_for_end()  # An earlier driver may have left a solver running.
         if self.journal.has("prepared") and self.solver.whole(0):
             return
-        # The first engine file is needed at this point, because the starter reads /RBODY/OFF from it.
+        # The first engine file is needed now, because the starter reads /RBODY/OFF from it.
         engine_file = self.solver.file(1, ".rad").name
         files = {engine_file: self.deck.leg(1, self.deck.end, None), **self.deck.files}
         for name, content in files.items():
@@ -116,13 +116,6 @@ class Driver:
             )
         self.journal.add("prepared")
 
-    def progress(self, seconds: float) -> str:
-        """Describe the engine run being computed, or how many ``seconds`` the starter has run before the first one."""
-        leg = self.at
-        if leg is None:
-            return f"starting ... {seconds:.0f} s"
-        return f"engine run {leg.number}, {leg.kind}: {leg.start:.6g} to {leg.until:.6g} of {self.limits.end:g}"
-
     def run(self) -> None:
         """Compute one engine run after another, up to the end of the run.
 
@@ -132,7 +125,7 @@ class Driver:
             If the solver fails or the disk is full.  The run continues from there when it is driven again.
         """
         if legs := self.journal.legs:
-            self.told(
+            self.report(
                 f"resumed: {len(legs)} engine runs are done, the last until {legs[-1].order.until:.6g}"
             )
             if self.journal.has_failed:
@@ -140,7 +133,7 @@ class Driver:
                 self._go_back("the engine run after it has failed")
         while order := self._choose_next():
             self.at = order
-            # An earlier driver may have started the engine run, and the solver may have finished it since then.
+            # An earlier driver may have started the engine run, and the solver may have finished it in the meantime.
             begun = self.journal.records[-1].get("order") == [*order]
             if not begun or self._find_problem(order):
                 self._start(order)
@@ -165,7 +158,7 @@ class Driver:
         legs = self.journal.legs
         self.journal.add("back", legs=len(legs) - 1)
         start = legs[-1].order.start
-        self.told(f"the last engine run is computed again from {start:.6g}: {reason}")
+        self.report(f"the last engine run is computed again from {start:.6g}: {reason}")
 
     def _start(self, order: Order) -> None:
         """Write the engine file of an engine run and start the engine."""
@@ -179,7 +172,7 @@ class Driver:
         write_as_a_whole(self.solver.file(number, ".rad"), text)
         self.journal.add("started", order=order)
         self.solver.start("engine", number)
-        self.told(
+        self.report(
             f"engine run {number}: {order.kind} from {order.start:.6g} to {order.until:.6g}"
         )
 
@@ -192,11 +185,11 @@ class Driver:
                 silence = self.solver.silent_for()
                 if silence > reported_at:
                     reported_at = 2 * silence
-                    self.told(
+                    self.report(
                         f"the solver has written nothing for {silence:.0f} s; stop it with Ctrl-C, then --resume"
                     )
         except KeyboardInterrupt:
-            self.told("stopping: --resume computes the current engine run again")
+            self.report("stopping: --resume computes the current engine run again")
             self.solver.end()
             raise
 
@@ -213,7 +206,7 @@ class Driver:
         return "the engine run left no complete restart file; make room on the disk, then --resume"
 
     def _recover(self, order: Order, problem: str) -> None:
-        """Record in the journal that an engine run failed; if its files are incomplete, it is computed once more.
+        """Record in the journal that an engine run failed. If its files are incomplete, the run is computed once more.
 
         Raises
         ------
@@ -224,7 +217,7 @@ class Driver:
         self.journal.add("failed", leg=order.number)
         if has_failed or not self.solver.ended_well(order.number):
             raise D2RPickError(f"{self.solver.file(order.number, '.out')}: {problem}")
-        self.told(
+        self.report(
             f"engine run {order.number}: its restart file or history is incomplete; "
             f"computing it again from {order.start:.6g}"
         )
@@ -242,7 +235,7 @@ class Driver:
         if findings.contact is not None:
             window = find_next_window(self.journal.legs, self.limits)
             if window.warning:
-                self.told(f"warning: out-of-place: {window.warning}")
+                self.report(f"warning: out-of-place: {window.warning}")
         kept_restarts = {number, number - 1, number - 2}
         if order.rigid:
             # The restart file from before the window is needed in case the window is not used after all.
@@ -251,7 +244,7 @@ class Driver:
 
 
 def _limit_step(order: Order, legs: Sequence[Leg], interval: float) -> float | None:
-    """Return the largest time step of a rigid engine run [time], from the smallest mean step of the deformable ones."""
+    """Return the largest time step of a rigid engine run [time], which depends on the smallest mean deformable step."""
     if not order.rigid:
         return None
     steps = [
@@ -279,11 +272,15 @@ def find_leg_results(order: Order, evidence: GrowingEvidence) -> LegFindings:
     flights = evidence.flights()
     flies = bool(flights) and flights[-1].end is None
     free = evidence.free_since(history.end)
+    if flies:
+        free = max(free, flights[-1].start)
     tr = _choose_end(order, history, free)
     half_period = evidence.motion.longest_swing(history.end)
     findings = LegFindings(free=free, flies=flies, tr=tr, swing=half_period)
     if flies and (swing := find_swing(history, free, tr)):
-        findings = findings._replace(steady_from=swing.flight, swing_warning=swing.told)
+        findings = findings._replace(
+            steady_from=swing.flight, swing_warning=swing.warning
+        )
     wait = evidence.find_wait(free, history.end)
     if wait is None:
         return findings
@@ -300,7 +297,7 @@ def find_leg_results(order: Order, evidence: GrowingEvidence) -> LegFindings:
 
 
 def _choose_end(order: Order, history: History, free: float) -> float:
-    """Choose tr: the start of an engine run in flight if it has more internal energy than the end, else the end."""
+    """Choose tr: the start of an engine run in flight if its internal energy is higher there, otherwise its end."""
     start = max(order.start, history.start)
     falls = history.energy_at(start) > history.energy_at(history.end)
     if falls and order.start >= max(free, order.switch_after):
@@ -309,7 +306,7 @@ def _choose_end(order: Order, history: History, free: float) -> float:
 
 
 class Journal:
-    """The journal of a driven run. Records are only appended, and each record is on the disk when `add` returns.
+    """The journal of a driven run. Records are only appended; each record is on the disk when `add` returns.
 
     A cut or damaged line is ignored: what it reports is done again.
     """
@@ -324,7 +321,7 @@ class Journal:
 
     @property
     def legs(self) -> list[Leg]:
-        """Computed engine runs, except those undone by a restart from an earlier time."""
+        """Computed engine runs, except those that a restart from an earlier time has undone."""
         legs: list[Leg] = []
         for record in self.records:
             if record["event"] == "ended":

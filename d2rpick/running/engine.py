@@ -45,27 +45,27 @@ _HOME: Final = "OPENRADIOSS_PATH"
 _STARTER_ERROR: Final = r"(?m)^ *[1-9]\d* +ERROR\(S\)"
 # Number of bytes that are read at the end of a listing.
 _TAIL_SIZE: Final = 1 << 14
-# Number of bytes that are read at the end of a listing to find errors, which much output follows in a starter listing.
+# Number of bytes at the end of a listing that are searched for errors; in a starter listing, much output follows them.
 _LISTING_SIZE: Final = 1 << 22
 # An error in a listing consists of its first line and the next three lines.
 _ERROR_LINES: Final = r".*\*\* ERROR.*(?:\n.*){0,3}"
 _MOST_LINES: Final = 8
 # Smallest size of a complete restart file, relative to the size of the starter's restart file [-].
 _WHOLE: Final = 0.98
-# _TIME_TO_STOP: time that a solver is given to stop on its own [s].
+# _TIME_TO_STOP: time within which a solver is expected to stop on its own [s].
 # _PAUSE: time between two checks of whether the solver has stopped [s].
 _TIME_TO_STOP, _PAUSE = 4.0, 0.05
 
 
 class Commands(NamedTuple):
-    """The commands of the starter and the engine, by default those of the installation, and the thread count."""
+    """The commands of the starter and the engine (by default, those of the installation) and the number of threads."""
 
     starter: str | None = None
     engine: str | None = None
     threads: int = 1
 
     def words(self, program: str, deck: str) -> list[str]:
-        """Split the command that starts a program on a deck as a shell would.
+        """Split the command that starts a program for a deck as a shell would.
 
         Raises
         ------
@@ -90,7 +90,7 @@ class Commands(NamedTuple):
         return [word.replace("{deck}", deck) for word in words]
 
     def make_environment(self) -> dict[str, str]:
-        """Return the environment of the programs, which is the current one plus the variables of an installation."""
+        """Return the environment of the programs: the current environment plus the variables of an installation."""
         environment = {"OMP_NUM_THREADS": str(self.threads), "OMP_STACKSIZE": "400m"}
         libraries = os.environ.get("LD_LIBRARY_PATH", "")
         if home := os.environ.get(_HOME):
@@ -99,7 +99,7 @@ class Commands(NamedTuple):
         return {**environment, **os.environ, "LD_LIBRARY_PATH": libraries}
 
     def missing(self) -> str:
-        """Return the first program that cannot be started; empty if all of them can."""
+        """Return the first program that cannot be started; empty if all programs can be started."""
         for program in _PROGRAMS:
             executable = self.words(program, "{deck}")[0]
             if shutil.which(executable) is None:
@@ -135,7 +135,7 @@ def alone(folder: Path) -> Iterator[None]:
 
 
 def _lock(path: Path) -> int | None:
-    """Lock a file and return its descriptor, which keeps the lock while it is open; None if the file is locked."""
+    """Lock a file and return its descriptor, which keeps the lock as long as it is open; None if the file is locked."""
     import fcntl
 
     lock = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
@@ -148,7 +148,7 @@ def _lock(path: Path) -> int | None:
 
 
 class Solver:
-    """The solver in the folder of a run; only one process runs at a time.
+    """The solver in the folder of a run. Only one process runs at a time.
 
     The process keeps a lock while it lives, so that a later driver can see it.
     """
@@ -174,7 +174,7 @@ class Solver:
         self.history(number).unlink(missing_ok=True)
 
     def start(self, program: str, number: int) -> None:
-        """Start the solver for an engine run: the starter if its ``number`` is 0, otherwise the engine.
+        """Start the solver for an engine run: the starter if ``number`` is 0, otherwise the engine.
 
         Raises
         ------
@@ -270,7 +270,7 @@ class Solver:
             return np.empty(0)
 
     def started_well(self) -> bool:
-        """Return True if the starter ended without an error and left a complete restart file."""
+        """Return True if the starter ended without errors and left a complete restart file."""
         has_error = re.search(_STARTER_ERROR, self._read_end(0, ".out"))
         return self.whole(0) and not has_error
 
@@ -296,7 +296,7 @@ class Solver:
                 restart.unlink()
 
     def check_room(self, number: int) -> None:
-        """Raise D2RPickError if the disk has no room for the restart files of an engine run and of the next one."""
+        """Raise D2RPickError if the disk has no room for the restart files of an engine run and of the one after it."""
         needed = 2 * self._measure_largest_restart()
         free = shutil.disk_usage(self.folder).free
         if free < needed:
@@ -321,7 +321,7 @@ class Solver:
 
 
 def _split_lines(text: str) -> list[str]:
-    """Return the lines of an output without redundant spaces; lines without content are left out."""
+    """Return the lines of an output without redundant spaces; empty lines are left out."""
     return [" ".join(line.split()) for line in text.splitlines() if line.strip(" -*")]
 
 

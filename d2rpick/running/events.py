@@ -15,33 +15,40 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.history import History
     from d2rpick.running.evidence import GrowingEvidence
-    from d2rpick.running.witness import Quiet
+    from d2rpick.running.swing import Swing
+    from d2rpick.running.witness import SeenFlight
 
 # Smallest height of the internal energy above its recent minimum at a good tr, relative to its recent range [-].
 # In computed runs, a tr at an energy minimum locked in half of the energy at td, and a tr at a peak 90 % or more.
 _HIGH: Final = 0.75
-_RIGID: Final = (
-    "parts have become rigid: part data are not used until they deform again"
-)
 
 
-class Event(NamedTuple):
-    """An event: a keyword for scripts, its time, the state at which it was ``seen`` [time], and a sentence.
+class EnergyRange(NamedTuple):
+    """The internal energy at a state, and its range in the force-free time up to this state."""
 
-    ``wait`` is the force-free time that shows a flight [time].  ``left`` is the change in that time, as a share of the
-    largest value.  ``tr`` is the advised time [time].  Each is None if it does not apply to the event.
+    energy: float
+    lowest: float
+    highest: float
+
+
+class RunEvent(NamedTuple):
+    """An event of a run: a keyword for scripts, its time, and the state at which it was ``seen`` [time].
+
+    ``flight`` is the flight of the event, as it was detected.  ``tr`` is the advised time [time], ``energy`` the
+    internal energy on which the advice is based, and ``swing`` the part that oscillates too strongly at ``tr``.  Each
+    is None if it does not apply to the event.
     """
 
     event: str
-    time: float | None
-    seen: float | None
-    message: str
-    wait: float | None = None
-    left: float | None = None
+    time: float
+    seen: float
+    flight: SeenFlight | None = None
     tr: float | None = None
+    energy: EnergyRange | None = None
+    swing: Swing | None = None
 
 
-def find_events(evidence: GrowingEvidence) -> tuple[Event, ...]:
+def find_events(evidence: GrowingEvidence) -> tuple[RunEvent, ...]:
     """Return all events in the order of their detection.
 
     The events of a run so far are the first ones of the whole run.  The evidence keeps those of past flights.
@@ -53,12 +60,12 @@ def find_events(evidence: GrowingEvidence) -> tuple[Event, ...]:
     """
     flights = evidence.flights()
     history = evidence.history
-    events: list[Event] = []
+    events: list[RunEvent] = []
     for flight in flights:
         if flight.wait.source == "given":
             longest = evidence.motion.longest(flight.seen)
             check_wait(flight.wait.time, longest, ", ".join(history.source))
-        events += _describe_flight(flight, evidence)
+        events += _list_events_of(flight, evidence)
     for start, seen_at, end in evidence.find_rigid_times():
         # No switch is advised while the parts are rigid.
         events = [
@@ -68,85 +75,63 @@ def find_events(evidence: GrowingEvidence) -> tuple[Event, ...]:
         ]
         if start <= history.time[:FEWEST][-1]:
             continue  # These bodies are always rigid.
-        events.append(Event("rigid", start, seen_at, _RIGID))
+        events.append(RunEvent("rigid", start, seen_at))
         if end < history.end:
-            events.append(Event("deformable", end, end, "all parts deform again"))
+            events.append(RunEvent("deformable", end, end))
     if not flights or flights[0].start > history.start:
         push = evidence.find_contact(fewest=1)
         if push is not None:
-            events.append(Event("load", push, push, "a force acts"))
-    return tuple(sorted(events, key=lambda event: event.seen or 0.0))
+            events.append(RunEvent("load", push, push))
+    return tuple(sorted(events, key=lambda event: event.seen))
 
 
-def _describe_flight(flight: Quiet, evidence: GrowingEvidence) -> Iterator[Event]:
+def _list_events_of(
+    flight: SeenFlight, evidence: GrowingEvidence
+) -> Iterator[RunEvent]:
     """Yield the events of a flight: its start, the advised switch, and the contact that ends it."""
     key = flight.start, flight.seen
     events = evidence.decided.get(key)
     if events is None:
-        events = (_describe_start(flight), *_suggest_switch(evidence.history, flight))
+        start = RunEvent("flight", flight.start, flight.seen)
+        events = (start, *_suggest_switch(evidence.history, flight))
         if flight.end is not None or events[-1].tr is not None:
             evidence.decided[key] = events
-    yield from events
     if flight.end is not None:
-        message = (
-            f"a force acts, {flight.end - flight.start:.4g} after the flight began"
-        )
-        yield Event("contact", flight.end, flight.end, message)
+        events = (*events, RunEvent("contact", flight.end, flight.end))
+    # An event does not change when the flight ends later.
+    flight_so_far = flight._replace(end=None)
+    for event in events:
+        yield event._replace(flight=flight_so_far)
 
 
-def _describe_start(flight: Quiet) -> Event:
-    """Report that a flight was detected, which evidence shows it, and why it was not detected earlier."""
-    landing = "landing time unknown"
-    if flight.level is not None:
-        landing = f"landing at about {flight.level:.4g} if it lands as high as it took off, later if lower"
-    message = (
-        f"no force for {flight.seen - flight.start:.4g}, the required force-free time is {flight.wait.time:.4g} "
-        f"({flight.wait.reason}); {flight.quantity} is constant within {flight.left:.1e} of its maximum; {landing}"
-    )
-    return Event(
-        "flight", flight.start, flight.seen, message, flight.wait.time, flight.left
-    )
-
-
-def _suggest_switch(history: History, flight: Quiet) -> Iterator[Event]:
+def _suggest_switch(history: History, flight: SeenFlight) -> Iterator[RunEvent]:
     """Advise when to switch in a flight: at once if nothing vibrates, otherwise while the internal energy is high.
 
     If it is low for one wait, the time of its maximum is advised.
     """
-    wait = flight.wait.time
     if flight.wait.source == "at-rest":
-        message = "switch now: nothing vibrates, so any tr is right, and the earliest keeps the parts rigid for longest"
-        yield Event("switch", flight.seen, flight.seen, message, wait, tr=flight.seen)
+        yield RunEvent("switch", flight.seen, flight.seen, tr=flight.seen)
         return
-    last, end = flight.seen + wait, flight.end or np.inf
+    wait, end = flight.wait.time, flight.end or np.inf
+    last = flight.seen + wait
     times, energies = history.between(flight.seen, last)
     for now, energy in zip(times.tolist(), energies.tolist(), strict=True):
         if now >= end:
             return
         energies_so_far = history.between(now - wait, now)[1]
-        low, high = float(energies_so_far.min()), float(energies_so_far.max())
-        span = f"its highest value of the last {wait:.4g} ({low:.4g} to {high:.4g})"
-        if energy >= low + _HIGH * (high - low):
-            message = (
-                f"switch now: the internal energy, {energy:.4g}, is near {span}; it is not compared with the energy "
-                f"at td, which is unknown yet{_warn_of_swing(history, flight, now)}"
-            )
-            yield Event("switch", now, now, message, wait, tr=now)
+        lowest, highest = float(energies_so_far.min()), float(energies_so_far.max())
+        in_range = EnergyRange(energy, lowest, highest)
+        if energy >= lowest + _HIGH * (highest - lowest):
+            swing = _find_strong_swing(history, flight, now)
+            yield RunEvent("switch", now, now, tr=now, energy=in_range, swing=swing)
             return
         if now == flight.seen:
-            message = (
-                f"not yet: the internal energy, {energy:.4g}, is far below {span}; "
-                f"waiting until {last:.6g} for its maximum"
-            )
-            yield Event("later", last, now, message, wait)
+            yield RunEvent("later", last, now, energy=in_range)
     if history.end > last < end:
         tr = highest_energy(history, flight.seen, last)
-        message = (
-            f"the internal energy was highest at {tr:.6g}: restart from an earlier state to switch there"
-            f"{_warn_of_swing(history, flight, tr)}"
-        )
         now = float(history.between(last, history.end)[0][0])
-        yield Event("switch", tr, now, message, wait, tr=tr)
+        swing = _find_strong_swing(history, flight, tr)
+        yield RunEvent("switch", tr, now, tr=tr, swing=swing)
 
 
 def highest_energy(history: History, start: float, end: float) -> float:
@@ -155,9 +140,7 @@ def highest_energy(history: History, start: float, end: float) -> float:
     return float(time[energy.size - 1 - int(np.argmax(energy[::-1]))])
 
 
-def _warn_of_swing(history: History, flight: Quiet, tr: float) -> str:
-    """Return a warning if parts oscillate too strongly in a flight that has lasted up to tr; otherwise empty."""
+def _find_strong_swing(history: History, flight: SeenFlight, tr: float) -> Swing | None:
+    """Return the part that oscillates too strongly in a flight that has lasted up to tr; None if there is none."""
     swing = find_swing(history, flight.start, tr) if flight.parts else None
-    if swing is None or swing.flight <= tr - flight.start:
-        return ""
-    return f"; {swing.told}"
+    return swing if swing and swing.flight > tr - flight.start else None

@@ -17,7 +17,7 @@ from d2rpick.histories.history import EXACT, select_states
 from d2rpick.histories.samples import find_stretches, find_window
 from d2rpick.running.inner_motion import InnerMotion, Wait
 from d2rpick.running.record import GrowingColumn, RunningMaximum
-from d2rpick.running.witness import GrowingWitness, Quiet
+from d2rpick.running.witness import GrowingWitness, SeenFlight
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -26,9 +26,9 @@ if TYPE_CHECKING:
     from d2rpick.histories.names import Part
     from d2rpick.running.inner_motion import MovingParts
 
-# Largest number of states used to determine gravity.
+# Largest number of states from which gravity is determined.
 _GRAVITY_STATES: Final = 1000
-# An internal energy below this fraction of the kinetic energy is round-off and shows no vibration [-].
+# An internal energy below this fraction of the kinetic energy is round-off, which shows no vibration [-].
 _ROUND_OFF: Final = 1e-6
 
 
@@ -52,7 +52,7 @@ class GrowingEvidence:
         self.motion = InnerMotion(of_deck, before)
         # Evidence for each set of parts, and last for the model if its momentum or its contact energy is known.
         self.witnesses: list[GrowingWitness] = []
-        # Evidence that still grows, keyed by its parts, or by None for the whole model.
+        # Evidence that still grows, by its parts; None is the key for the whole model.
         self._going_on: dict[tuple[Part, ...] | None, GrowingWitness] = {}
         self._first_momenta: Samples | None = None
         self._has_moved, self._largest_momentum = RunningMaximum(), 0.0
@@ -60,7 +60,7 @@ class GrowingEvidence:
         self._complete = GrowingColumn()
 
     def take(self, states: History, history: History) -> None:
-        """Append states, which must have the same quantities as the states so far; ``history`` contains all states."""
+        """Append states with the same quantities as all earlier states; ``history`` contains all states."""
         self.history = history
         contact = states.balance
         if contact is not None and contact.sliding is None:
@@ -116,7 +116,7 @@ class GrowingEvidence:
         columns: Samples,
         written: tuple[Momenta | None, Balance | None],
     ) -> None:
-        """Append states to the evidence for a set of parts; after states without momentum, start the evidence anew.
+        """Append states to the evidence for a set of parts; after states without momentum, begin the evidence anew.
 
         ``columns`` are those of `GrowingWitness.add`, from the ``written`` momenta and energies.
         """
@@ -131,25 +131,25 @@ class GrowingEvidence:
         if not has_momentum[-1:].all():
             self._going_on.pop(parts, None)
 
-    def flights(self) -> tuple[Quiet, ...]:
+    def flights(self) -> tuple[SeenFlight, ...]:
         """Return all flights that lasted for the required force-free time, in ascending order.
 
         As the run goes on, flights are only added, and the last one gets its ``end``.
         """
-        candidates: list[tuple[Quiet, float]] = []
+        candidates: list[tuple[SeenFlight, float]] = []
         for witness in self.witnesses:
             witness.examine(self.find_wait, self._find_gravity)
             last_time = float(witness.time[-1])
             candidates += [(flight, last_time) for flight in witness.flights]
         # If the parts and the model show a flight at the same state, the flight of the parts comes first.
         candidates.sort(key=lambda pair: pair[0].seen)
-        chosen: list[Quiet] = []
+        chosen: list[SeenFlight] = []
         for flight, last_time in candidates:
             last_end = chosen[-1].end if chosen else -np.inf
             if last_end is None or flight.seen <= last_end:
                 continue
             if flight.end is None:
-                # The evidence of the parts may end during the flight, for example when the parts become rigid.
+                # The evidence of the parts may end during the flight, e.g. when the parts become rigid.
                 ends = (
                     longer.end
                     for longer, _ in candidates
@@ -175,7 +175,7 @@ class GrowingEvidence:
         return None if self.motion.is_unfinished(now) else longest
 
     def _stores_no_energy(self, start: float, now: float) -> bool:
-        """Return True if the internal energy in a span is round-off compared with the kinetic energy, if written."""
+        """Return True if the internal energy in a span is only round-off of the kinetic energy, if that is written."""
         history = self.history
         internal = np.abs(history.between(start, now)[1]).max()
         balance, kinetic = history.balance, 0.0
@@ -202,9 +202,11 @@ class GrowingEvidence:
         start, end = begin + first, begin + last
         states = [*_sample_states(begin, start), *_sample_states(start + 1, end)]
         so_far = select_states(momenta, np.array(states, np.intp))
-        if so_far.change(witness.members) <= so_far.noise(witness.members):
-            return 0.0  # A fit to a constant momentum would find false gravity.
         laws = get_laws_of(so_far, witness.members, history.balance)
+        if witness.is_constant(first, last):
+            # A fit to a constant momentum would give a false gravity.
+            flies = witness.moves(first, last) and not laws.is_carried
+            return 0.0 if flies else None
         return laws.gravity(states.index(start), len(states) - 1)
 
     def free_since(self, time: float) -> float:
@@ -236,7 +238,7 @@ class GrowingEvidence:
         return None
 
     def find_rigid_times(self) -> Iterator[tuple[float, ...]]:
-        """Yield the periods in which the part momenta were those of rigid bodies: start, detection and end [time].
+        """Yield the periods in which the part momenta were those of rigid bodies, as (start, detection, end) [time].
 
         The last of these periods may last to the end of the record.
         """
@@ -249,7 +251,7 @@ class GrowingEvidence:
 
 
 def _sample_states(first: int, last: int) -> Samples:
-    """Return the states from ``first`` to ``last``, or a uniform selection of them if there are too many."""
+    """Return the states from ``first`` to ``last``, or evenly spaced states among them if there are too many."""
     return np.linspace(first, last, min(last - first + 1, _GRAVITY_STATES)).round()
 
 
@@ -272,7 +274,7 @@ def _make_columns(
 
 
 def _list_sets(momenta: Momenta) -> tuple[tuple[int, ...], ...]:
-    """Return the sets of parts that may fly together: the chosen parts plus all connected parts, and all parts.
+    """Return the sets of parts that may fly together: the chosen parts with all connected parts, and all parts.
 
     Parts are given by their numbers in the momenta.
     """

@@ -1,4 +1,4 @@
-"""Print the cards of a first run that switches its parts by contact forces, from which the solver detects flights.
+"""Print the cards of a first run that switches its parts by contact forces, by which the solver detects flights.
 
 Radioss: legs that sensors end by /STOP/LSENSOR (tried with a solver; docs/reference/first-run.md).  LS-DYNA: a pair of
 switch sets with CODE 2 (no contact force) and 4 (contact force), from published text.
@@ -26,6 +26,7 @@ from d2rpick.deck.radioss_run import find_parts_off, read_run
 from d2rpick.deck.radioss_sensors import list_forces
 from d2rpick.deck.reader import read_deck
 from d2rpick.deck.sensor_cards import write_flight_sensors
+from d2rpick.deck.suiting import find_suiting
 from d2rpick.deck.switch_sets import Waiting, write_set_pair
 from d2rpick.running.checks import NO_CONTACT, refuse_held
 from d2rpick.running.inner_motion import Wait, check_wait, wait_of_deck
@@ -41,7 +42,7 @@ _MOST_LEGS: Final = 9
 # Ratio of the force-free time that shows a flight to the largest time step while parts are rigid [-].
 # With this time-step limit, a contact is detected at most one time step late.
 _STEPS_PER_WAIT: Final = 300
-# Ratio of the required force-free time to the time after a switch in which LS-DYNA ignores contacts [-].
+# Ratio of the required force-free time to the time for which LS-DYNA ignores contacts after a switch [-].
 _DELAYS_PER_WAIT: Final = 100
 # Radioss keywords of loads that are not contact forces.
 _LOADS: Final = ("CLOAD", "PLOAD", "MONVOL", "LOAD", "PRELOAD", "LASER", "PFLUID")
@@ -65,6 +66,10 @@ _OF_LS_DYNA: Final = (
     "These switches do not react to other contacts, rigid walls and loads.",
     "These cards were not tested with the solver.",
 )
+_DELETED: Final = (
+    "Constraints that all lie on these parts are deleted while the parts are rigid (NRBF or NCSF 1), and then activated"
+    " again (2)."
+)
 _AT_REST: Final = "In free fall from rest: rigid from 0, TIME1 0."
 _OF_LOAD: Final = "TIME1 is 0: if you know the end of the load, give it (--after)."
 _WITHOUT_OFFSET: Final = (
@@ -74,8 +79,8 @@ _WITHOUT_OFFSET: Final = (
 # _PUSHES: prefixes of the LS-DYNA keywords for loads that are not contact forces.
 # _OF_GRAVITY: prefixes of the LS-DYNA keywords that define gravity.
 _PUSHES, _OF_GRAVITY = ("LOAD_", "AIRBAG_"), ("LOAD_BODY", "LOAD_GRAVITY")
-# LS-DYNA makes the parts deformable before a contact if the gap is this multiple of the largest shell thickness [-].
-# The gap must exceed the contact thickness, which is half the thickness of each of the two shells.
+# LS-DYNA makes the parts deformable once the gap before a contact is this multiple of the largest shell thickness [-].
+# The gap must exceed the contact thickness, i.e. half the thickness of each of the two shells.
 _OFFSET_THICKNESSES: Final = 2
 
 
@@ -129,7 +134,7 @@ def first_card(
 
 
 def _choose_wait(path: str, inventory: Inventory, given: float | None) -> Wait:
-    """Return the given waiting time, or half of the deck's longest period; raise ArgumentError if neither is known."""
+    """Return the given waiting time or half of the deck's longest period; raise ArgumentError if neither is known."""
     of_deck = wait_of_deck(inventory)
     if given is not None:
         check_wait(given, of_deck, path)
@@ -174,7 +179,7 @@ def _make_radioss_card(
         node for node in find_bodies_kept_off(run.legs) if node not in bodies.nodes
     ]
     files = {}
-    # The engine runs are alternately deformable and rigid; the first one is rigid if the parts fall from rest.
+    # The engine runs are alternately deformable and rigid. The first one is rigid if the parts fall from rest.
     for number in range(1, _MOST_LEGS + 1 - at_rest):
         rigid = number % 2 == at_rest
         file = EngineFile(number, leg.stop.value, largest_step if rigid else None)
@@ -194,7 +199,7 @@ def _make_radioss_card(
 
 
 def _explain_wait(wait: Wait) -> str:
-    """Return the note on the waiting time, which is the force-free time that shows a flight."""
+    """Return the note on the waiting time, i.e. the force-free time that shows a flight."""
     return f"force-free time that marks a flight: {wait.time:.4g}; {wait.reason}"
 
 
@@ -212,9 +217,18 @@ def _make_ls_dyna_card(
     deck = read_deck(path)
     contact, keyword = _find_contact(path, deck)
     part_ids = check_ids(parts)
-    printing = Printing(part=tuple(part_ids), bodies=inventory.bodies(part_ids))
+    suiting = find_suiting(path, part_ids)
+    printing = Printing(
+        part=tuple(part_ids),
+        bodies=inventory.bodies(part_ids),
+        swset=suiting.swset or Printing().swset,
+        delete_nodal_bodies=suiting.delete_nodal_bodies,
+        delete_node_sets=suiting.delete_node_sets,
+    )
     offset, offset_note = _choose_offset(inventory, keyword)
     notes = [_explain_wait(wait), *_OF_ALL, *_OF_LS_DYNA, offset_note]
+    if suiting.delete_nodal_bodies or suiting.delete_node_sets:
+        notes.append(_DELETED)
     if after is None:
         starts_moving = deck.named("INITIAL_VELOCITY")
         at_rest = bool(inventory.boundary.gravity) and not starts_moving
@@ -237,7 +251,7 @@ def _make_ls_dyna_card(
 
 
 def _find_contact(path: str, deck: Deck) -> tuple[int, str]:
-    """Return the id and keyword of the contact on which a switch can wait; raise DeckError if there is none."""
+    """Return the id and keyword of the contact for which a switch can wait; raise DeckError if there is none."""
     for card in deck.cards:
         if card.name.startswith(_PUSHES) and not card.name.startswith(_OF_GRAVITY):
             raise DeckError(f"{card.at}: *{card.name} {_UNSEEN}")
@@ -253,7 +267,7 @@ def _find_contact(path: str, deck: Deck) -> tuple[int, str]:
 
 
 def _choose_offset(inventory: Inventory, keyword: str) -> tuple[float, str]:
-    """Return the gap between the surfaces at which the parts are made deformable again [length], with a note."""
+    """Return the gap between surfaces at which the parts are made deformable again [length], with a note."""
     thicknesses = [part.section.thickness for part in inventory.parts.values()]
     thickest = max((thickness or 0.0 for thickness in thicknesses), default=0.0)
     if not keyword.startswith("CONTACT_AUTOMATIC_") or thickest <= 0:

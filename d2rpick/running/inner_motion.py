@@ -1,4 +1,4 @@
-"""Determine the waiting time (the force-free time that shows a flight) from the oscillations inside the body.
+"""Determine the waiting time (the force-free time that shows a flight) from oscillations inside the body.
 
 The wait is half of the longest inner period.  Inside a load, contacts open and close as parts swing on their springs,
 and the longest gap between them is shorter than that (measured: 13 of 17 ms in a falling box, 14 of 22 ms in a car).  A
@@ -22,23 +22,23 @@ if TYPE_CHECKING:
     from d2rpick.deck.model import Inventory
     from d2rpick.histories.history import History, Momenta, Samples
 
-    # Slices of the latest states, each with the columns of the parts that move in it.
+    # Slices of the latest states, each with the columns of the parts that move in the slice.
     MovingParts = Sequence[tuple[slice, Sequence[int]]]
 
-# Smallest velocity change that counts as an oscillation, relative to the velocity range so far [-].
+# Velocity changes of at least this fraction of the velocity range so far are treated as an oscillation [-].
 _SWING: Final = 1 / 3
 # _INNER: fraction of the velocity change ignored at each end when a half period is measured [-].
-# _INNER_TIME: fraction of the half period in which a harmonic motion makes the middle part of that change [-].
+# _INNER_TIME: fraction of the half period that the middle part of that change takes in a harmonic motion [-].
 _INNER, _INNER_TIME = 0.1, float(np.arccos(-0.8) - np.arccos(0.8)) / np.pi
-# Largest mean force in an oscillation treated as body rotation, relative to the largest mean force so far [-].
+# A mean force up to this fraction of the largest one so far is attributed to body rotation [-].
 _ROTATION: Final = 0.05
-# Smallest number of states in an oscillation; a change within fewer states is treated as a jump.
+# Smallest number of states in an oscillation; a change over fewer states is treated as a jump.
 _FEWEST_STATES: Final = 4
 # Smallest relative velocity of an oscillating part, as a fraction of the velocity of all parts [-].
 _AT_REST: Final = 1e-3
-# An unfinished oscillation longer than this may last arbitrarily long, relative to the longest half period so far [-].
+# An unfinished oscillation longer than this multiple of the longest half period may last arbitrarily long [-].
 _MUCH_LONGER: Final = 2.0
-# _LONGEST_FREE: a longer free oscillation is attributed to body rotation, in half periods of the deck [-].
+# _LONGEST_FREE: a free oscillation above this many half periods of the deck is attributed to body rotation [-].
 # _LONGEST_PUSHED: upper limit for the half period of an oscillation under load, in half periods of the deck [-].
 _LONGEST_FREE, _LONGEST_PUSHED = 1.5, 2.5
 # Smallest waiting time that the user may give, relative to half the longest period [-], which is uncertain by 10 %.
@@ -48,7 +48,7 @@ _HEAVY: Final = 0.05
 
 
 class Wait(NamedTuple):
-    """Force-free time that shows a flight [time], with its source and the reason for it.
+    """Force-free time that shows a flight [time], with its source and a reason.
 
     ``source``: "given", "record", "deck" or "at-rest".  ``least`` is a lower bound of half of a period of the deck
     [time]; None if that is the wait itself.
@@ -84,9 +84,9 @@ class _Motion:
         self.name, self._factor = name, halves_per_swing
         # True once an unforced oscillation has been detected.
         self.has_free_swing = False
-        # The first half period has no duration; it ends when the motion is first detected.
+        # The first half period has no duration, because it ends when the motion is first detected.
         self._swings: list[_HalfPeriod] = []
-        # The columns contain the time, the value, and the smallest change that counts as an oscillation.
+        # The columns contain the time, the value, and the smallest change that is treated as an oscillation.
         self._columns = GrowingColumn()
         self._highest, self._lowest = RunningMaximum(), RunningMaximum()
         # State at the last extremum, most extreme state since then, and direction (1 rising, -1 falling).
@@ -95,7 +95,7 @@ class _Motion:
     def add(
         self, time: Samples, values: Samples, least_swing: Samples
     ) -> Iterator[_HalfPeriod]:
-        """Append states (k,), and return the half periods that they complete, if larger than ``least_swing`` (k,)."""
+        """Append states (k,), and return the half periods completed by them that exceed ``least_swing`` (k,)."""
         ranges = self._highest.add(values) + self._lowest.add(-values)
         limits = np.maximum(_SWING * ranges, least_swing)
         rows = self._columns.add(np.column_stack([time, values, limits]))
@@ -117,7 +117,7 @@ class _Motion:
                 self._sign = -self._sign
 
     def _begin(self, rows: Samples) -> None:
-        """Begin to follow the motion, which is first detected at the last of its states."""
+        """Begin to follow a motion that is first detected at the last of its states."""
         distance = np.abs(rows[:, 1] - rows[-1, 1])
         self._extreme = len(rows) - 1
         self._turn = self._extreme - int(np.argmax(distance[::-1]))
@@ -126,7 +126,7 @@ class _Motion:
         self._swings.append(_HalfPeriod(self, now, now, now))
 
     def _measure(self, rows: Samples, now: float) -> _HalfPeriod:
-        """Measure the half period from the last extremum to the current extreme value, which is detected at ``now``."""
+        """Measure the half period from the last extremum to the current extreme value, detected at ``now``."""
         time, distance = rows[:, 0], np.abs(rows[:, 1] - rows[0, 1])
         low = int(np.flatnonzero(distance <= _INNER * distance[-1])[-1])
         high = low + int(np.argmax(distance[low:] >= (1 - _INNER) * distance[-1]))
@@ -137,7 +137,7 @@ class _Motion:
         return self._swings[-1]
 
     def outlasts_earlier_swings(self, now: float, least_strength: float) -> bool:
-        """Return True if the current oscillation is much longer than all earlier ones and is neither rest nor rotation.
+        """Return True if the oscillation is much longer than all earlier ones and is neither rest nor rotation.
 
         The mean change by time of a rotation is below ``least_strength``.
         """
@@ -191,7 +191,7 @@ class InnerMotion:
         self._largest_speed, self._largest_energy = RunningMaximum(), RunningMaximum()
         # Time from which on the motions of the parts are used instead of the energy [time].
         self._parts_since = np.inf
-        # Longest half period of any part so far, with one entry for each time at which it increased.
+        # Longest half period of any part so far; a new entry is added each time it increases.
         self._longest_of_parts = [_Longest(-np.inf)]
         self._longest_of_energy = [_Longest(-np.inf)]
 
@@ -201,7 +201,7 @@ class InnerMotion:
         moving_parts: MovingParts,
         free_since: Callable[[float], float],
     ) -> None:
-        """Append states. ``free_since`` returns when the force-free time that lasts until a given time began [time]."""
+        """Append states; ``free_since`` returns when the force-free time that lasts until a given time began [time]."""
         momenta = states.find_momenta(of_parts=True)
         if momenta is not None and momenta.masses is not None:
             swings = self._follow_parts(momenta, momenta.masses, moving_parts)
@@ -242,7 +242,7 @@ class InnerMotion:
         so_far: list[_Longest],
         free_since: Callable[[float], float],
     ) -> None:
-        """Lengthen the waiting time to suit half periods that were neither rotations nor caused by a push.
+        """Lengthen the waiting time if half periods require it that were neither rotations nor caused by a push.
 
         A pushed swing counts if there is no deck and this motion has not yet had an unforced oscillation.
         """
@@ -265,24 +265,24 @@ class InnerMotion:
             so_far[-1] = longest
 
     def longest(self, now: float) -> Wait | None:
-        """Return the longest half period known at the time ``now``, from the deck or from the record so far."""
+        """Return the longest half period known at the time ``now`` from the deck or the record so far."""
         wait = self._get_longest(now).wait
         if wait is None or wait.time <= self._least_time:
             return self._least
         return wait
 
     def longest_swing(self, now: float) -> float:
-        """Return the longest half period known at the time ``now``, even if a push lengthened it [time]."""
+        """Return the longest half period known at the time ``now``, even if a push has lengthened it [time]."""
         return max(self._get_longest(now).swing, self._least_time)
 
     def _get_longest(self, now: float) -> _Longest:
-        """Return the longest half period known at a time, from the parts or, while no part moves, from the energy."""
+        """Return the longest half period known at a time: from the parts or, while no part moves, from the energy."""
         has_parts = self._parts_since <= now
         so_far = self._longest_of_parts if has_parts else self._longest_of_energy
         return so_far[bisect_right(so_far, now, key=lambda longest: longest.since) - 1]
 
     def is_unfinished(self, now: float) -> bool:
-        """Return True if an oscillation still lasts and is much longer than all earlier ones, and there is no deck."""
+        """Return True if an unfinished oscillation is much longer than all earlier ones and there is no deck."""
         if self._least is not None:
             return False
         least_strength = _ROTATION * self._get_longest(now).strength

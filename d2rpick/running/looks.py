@@ -25,12 +25,12 @@ if TYPE_CHECKING:
     from d2rpick.histories.names import Selection
     from d2rpick.histories.resuming import ResumePoint
 
-# Up to this number of states, a record is read completely each time, because early results may still change.
+# Up to this number of states, each read covers the whole record, because early results may still change.
 _FEWEST_STATES: Final = 200
 
 
 class Looks:
-    """Reads the same run repeatedly with the same ``selection`` and deck, and keeps the ``evidence`` of its flights.
+    """Reads the same run repeatedly with the same ``selection`` and deck, and collects the ``evidence`` of its flights.
 
     ``wait`` is the waiting time that the user gave [time].
     """
@@ -51,7 +51,7 @@ class Looks:
         self._names: frozenset[str] = frozenset()
 
     def look(self, names: Sequence[str], wait_before: float = 0.0) -> bool:
-        """Add the new states to the evidence, or begin with new evidence; return True if there are new states.
+        """Add the new states to the evidence, or begin the evidence anew; return True if there are new states.
 
         ``wait_before`` is the waiting time of earlier flights [time].  Errors as `new_states`.
         """
@@ -63,7 +63,7 @@ class Looks:
         return bool(states.time.size)
 
     def new_states(self, names: Sequence[str]) -> tuple[History, bool]:
-        """Return the new states, and True if they continue the states read before.
+        """Return the new states, and True if they continue the states that were read before.
 
         If they do not, since files were written anew, all states are given.
 
@@ -100,7 +100,7 @@ class Looks:
         return history
 
     def _read_on(self, names: Sequence[str]) -> History | None:
-        """Read the last states of each file, which include known states, and read new files completely.
+        """Read the last states of each file, including some known states, and read new files completely.
 
         Files without a resume point, such as files with forces only, are not read again.  Return None if a file cannot
         be read from its resume point, as when it was written anew.

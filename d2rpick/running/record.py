@@ -26,12 +26,12 @@ if TYPE_CHECKING:
 
 # Smallest time difference between two states, in units of the last printed digit [-].
 _APART: Final = 1.5
-# Tolerance for a value that is read twice, relative to the largest value [-]; sums over parts may be rounded.
+# Tolerance for a value that is read twice, relative to the largest value [-], because sums over parts are rounded.
 _SAME: Final = 1e-9
 
 
 class GrowingColumn:
-    """An array to which ``rows`` can be appended; the array is copied only when its capacity is doubled."""
+    """An array to which ``rows`` can be appended. It is copied only when its capacity is doubled."""
 
     def __init__(self) -> None:
         self.rows: NDArray[Any] = np.empty(0)
@@ -50,7 +50,7 @@ class GrowingColumn:
 
 
 class RunningMaximum:
-    """The largest of all values so far; limits based on it at a state do not depend on later states."""
+    """The largest of all values so far. Limits based on it at a state do not depend on later states."""
 
     def __init__(self) -> None:
         self._last: NDArray[Any] | None = None
@@ -112,7 +112,7 @@ def _join_tables(tables: Sequence[Any]) -> History:
 
 
 def _select_new_states(table: Table, known_table: Table | None) -> Table | None:
-    """Return the states of a table after the last known one; None if the table lacks this state or has changed it.
+    """Return the states of a table after the last known one; None if the table lacks that state or has changed it.
 
     The last state is left out if a later state with the same printed time may still replace it.
     """

@@ -1,4 +1,4 @@
-"""Choose the next engine run (leg) of a first run that chooses its own switching times, from the results so far.
+"""Choose the next engine run (leg) of a run that chooses its own switching times, from the results so far.
 
 The end of a leg is fixed before the leg begins.  The same command therefore computes the same legs, however fast the
 machine is.  A leg that replaces a discarded one gets its number.
@@ -16,23 +16,23 @@ from d2rpick.flight.window import FEWEST
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-# Each engine run (leg) of a first run is one of three kinds.
+# Each engine run (leg) of a first run is of one of three kinds.
 # LOAD: the parts are deformable.
-# PROBE: the parts are rigid, and the engine run goes on until it shows the contact that ends the flight.
-# RIGID: the parts are rigid, and the engine run ends at td, which a probe has determined.
+# PROBE: the parts are rigid, and the engine run continues until it shows the contact that ends the flight.
+# RIGID: the parts are rigid, and the engine run ends at the td that a probe has determined.
 LOAD, PROBE, RIGID = "load", "probe", "rigid"
-# Largest difference between times that are treated as equal [output intervals].
+# Times that differ by at most this are treated as equal [output intervals].
 # A history may end one output interval early.
 _STATES: Final = 1.5
-# If only this many engine-run numbers remain, no further flight is switched, so that the run can reach its end.
+# If only this many engine-run numbers are left, no further flight is switched, so that the run can reach its end.
 _KEPT_BACK: Final = 10
 # Shortest deformable engine run in a flight, relative to the force-free time that shows a flight [-].
 _LEAST: Final = 0.25
 # Length of a deformable engine run while the vibration period is unknown, as a fraction of the run [-].
 _UNKNOWN: Final = 0.02
-# A longer probe computes more after the contact, whereas shorter probes need more restarts.
-# _OF_FLOWN: smallest length of a probe as a fraction of its rigid time so far [-].
-# _OF_RUN: smallest length of a probe as a fraction of the run [-].
+# A longer probe computes more after the contact, but shorter probes need more restarts.
+# _OF_FLOWN: smallest length of a probe, as a fraction of its rigid time so far [-].
+# _OF_RUN: smallest length of a probe, as a fraction of the run [-].
 _OF_FLOWN, _OF_RUN = 0.4, 0.02
 # Assumed cost of writing and reading a restart file [deformable cycles]; about 5 cycles were measured.
 _RESTART: Final = 10
@@ -41,8 +41,8 @@ _RESTART: Final = 10
 # After flights of 2.4 and 2.8 half periods, two soft boxes landed 33 ms and 55 ms late.
 # After flights of at least 3.2 half periods, cars and boxes landed within 3.4 ms of the right time.
 _SWINGS: Final = 3.0
-# Smallest worthwhile saving of a window, relative to the cost of a deformable run [-].
-# Smaller savings do not justify the shift of later landings, which reached 37 ms in two computed boxes.
+# Smallest saving for which a window is worthwhile, relative to the cost of a deformable run [-].
+# Smaller savings do not justify the shift of later landings, which reached 37 ms for two computed boxes.
 _WORTH: Final = 0.04
 
 
@@ -60,7 +60,7 @@ class Limits(NamedTuple):
     rigid_cycle: float = 0.5
 
     def margin_of(self, flight: float, *, idle: bool = False) -> float:
-        """Return the margin before the contact that ends a flight of this length [time].
+        """Return the margin before the contact that ends a flight of the given length [time].
 
         If nothing vibrates (``idle``), a rigid body flies like the deformable one, and the least margin is enough.
         Otherwise the margin is at least a fraction of the flight that was enough in 8 windows of two structures.
@@ -77,7 +77,7 @@ class Limits(NamedTuple):
         return _STATES * self.interval
 
     def until_end(self, until: float) -> float:
-        """Return ``until``, or the end of the run if ``until`` is close to it [time]."""
+        """Return ``until``, or the end of the run if it is close to ``until`` [time]."""
         return until if until < self.end - self.same else self.end
 
 
@@ -164,7 +164,7 @@ class Leg(NamedTuple):
 
 
 class Window(NamedTuple):
-    """A flight that was switched at ``tr`` and ``td``, or that was left deformable for the given ``reason``.
+    """A flight that was switched at ``tr`` and ``td``, or left deformable for the given ``reason``.
 
     ``free`` is the start of the flight, ``contact`` the first contact of the rigid body, None if the run ended before.
     ``warning`` is about a part that moves so much that the body may be out of place at td; otherwise "".
@@ -216,7 +216,7 @@ def _starts_window(last: Order, findings: LegFindings, limits: Limits) -> bool:
 
 
 def _order_load(last: Order, findings: LegFindings, limits: Limits) -> Order:
-    """Schedule a deformable engine run that ends when a current or past flight has lasted for the required time.
+    """Schedule a deformable engine run that ends once a current or past flight has lasted for the required time.
 
     The flight in which a window ends is not switched again.
     """
@@ -235,7 +235,7 @@ def _order_load(last: Order, findings: LegFindings, limits: Limits) -> Order:
 
 
 def _order_probe(legs: Sequence[Leg], limits: Limits) -> Order:
-    """Schedule the next part of a probe that begins after the last engine run or has already begun."""
+    """Schedule the next part of a probe that began earlier or begins after the last engine run."""
     last, findings = legs[-1].order, get_flight_findings(legs)
     flown = 0.0
     if last.rigid:
@@ -269,7 +269,7 @@ def _return_before_contact(legs: Sequence[Leg], limits: Limits) -> Order:
 
 
 def find_next_window(legs: Sequence[Leg], limits: Limits) -> Window:
-    """Return the window before the contact that the last engine run showed; without contact, up to the end."""
+    """Return the window before the contact that the last engine run showed or, without a contact, up to its end."""
     rigid_orders = collect_joined_legs(legs[-1].order, legs)
     findings, contact = get_flight_findings(legs), legs[-1].findings.contact
     window = Window(
@@ -298,7 +298,7 @@ def find_next_window(legs: Sequence[Leg], limits: Limits) -> Window:
 def _explain_too_little_saved(
     legs: Sequence[Leg], tr: float, td: float, limits: Limits
 ) -> str | None:
-    """Explain why a window saves less than its probe and its restarts cost; None if it saves more.
+    """Explain why a window saves less than its probe and restarts cost; None if it saves more.
 
     The comparison uses cycles, because CPU times vary and the same command must compute the same run.
     """
@@ -318,7 +318,7 @@ def _explain_too_little_saved(
 
 
 def collect_joined_legs(order: Order, legs: Sequence[Leg]) -> list[Order]:
-    """Return the engine runs since parts last became rigid or deformable, up to and including the given one."""
+    """Return the engine runs since parts last became rigid or deformable, including the given one."""
     latest = {leg.order.number: leg.order for leg in legs}
     joined = [order]
     while (previous := latest.get(joined[0].number - 1)) and (
@@ -329,12 +329,12 @@ def collect_joined_legs(order: Order, legs: Sequence[Leg]) -> list[Order]:
 
 
 def get_flight_findings(legs: Sequence[Leg]) -> LegFindings:
-    """Return the findings at the end of the last deformable engine run about the flight that was then switched."""
+    """Return the findings about the flight that was then switched, at the end of the last deformable engine run."""
     return next(leg.findings for leg in reversed(legs) if leg.order.kind == LOAD)
 
 
 def windows(legs: Sequence[Leg], limits: Limits) -> list[Window]:
-    """Return all flights so far, switched or left deformable, in the order of their starts."""
+    """Return all flights so far, whether switched or left deformable, in the order of their starts."""
     by_start: dict[float, Window] = {}
     for count, leg in enumerate(legs, start=1):
         for start, end in leg.findings.short:

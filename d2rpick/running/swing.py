@@ -1,4 +1,4 @@
-"""Warn, before td is known, about parts that oscillate too strongly for their body to become rigid."""
+"""Warn, before td is known, of parts that oscillate too strongly for their body to become rigid."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class Swing(NamedTuple):
-    """An oscillating part: its ``name``, and the distance by which it can displace the body [length].
+    """An oscillating part: its ``name``, and the distance by which it can displace its body [length].
 
     In a flight shorter than ``flight`` [time] the ``error`` is more than 1 % of the path, which is too much.
     ``at_most`` is True if the error is an upper limit, because both parts may rotate instead, which displaces nothing.
@@ -31,7 +31,7 @@ class Swing(NamedTuple):
     at_most: bool = False
 
     @property
-    def told(self) -> str:
+    def warning(self) -> str:
         """The warning that is printed before the body becomes rigid."""
         motion, limit = "still moves relative to the others", "about"
         if self.at_most:
@@ -43,7 +43,7 @@ class Swing(NamedTuple):
 
 
 def find_swing(history: History, start: float, tr: float) -> Swing | None:
-    """Find how far an oscillating part can displace its body if the body becomes rigid at ``tr``.
+    """Find by how much an oscillating part can displace its body if the body becomes rigid at ``tr``.
 
     td is unknown.  It is assumed at the state before tr at which the parts are farthest from their places at tr.  None
     if the part momenta are not sufficient.
@@ -67,7 +67,7 @@ def find_swing(history: History, start: float, tr: float) -> Swing | None:
 def _measure_pair(
     momenta: Momenta, start: float, tr: float
 ) -> tuple[str, float, float] | None:
-    """Return the lighter of two parts, an upper bound on the displacement, and the path; None if other parts move.
+    """Return the lighter of two parts, an upper bound of the displacement, and the path; None if other parts move.
 
     The displacement of the heavier part and the path of both are in the unit of length.
     """

@@ -1,4 +1,4 @@
-"""Watch a run while it is being computed, and report each event once.
+"""Watch a run while it is being computed, and find each event once; ``report.follow`` describes the events.
 
 Nothing is started, stopped or changed.  The pause after each read is 100 times as long as the read, so that watching
 takes 1 % of a processor core.
@@ -6,23 +6,25 @@ takes 1 % of a processor core.
 
 from __future__ import annotations
 
-import shlex
 import time
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
-from d2rpick.base.errors import FormatError, HistoryError, RangeError, list_names
-from d2rpick.histories.listings import WITH_AN_ERROR, find_ending
+from d2rpick.base.errors import FormatError, HistoryError, RangeError
+from d2rpick.histories.listings import find_ending
 from d2rpick.histories.source import expand, find_later_legs
-from d2rpick.running.events import Event, find_events
+from d2rpick.running.events import find_events
 from d2rpick.running.looks import Looks
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
+    from d2rpick.base.errors import D2RPickError
     from d2rpick.deck.model import Inventory
     from d2rpick.histories.names import Selection
+    from d2rpick.running.events import RunEvent
+    from d2rpick.running.witness import SeenFlight
 
     # Inode number of a file, its size, and the time at which it was written [s].
     FileStamp = tuple[int, int, float]
@@ -34,20 +36,50 @@ _SHARE: Final = 0.01
 _SHORTEST, _LONGEST = 0.5, 5.0
 # A run is reported as silent after this time without output [s].
 _SILENT: Final = 60.0
-_PACKED: Final = "normally: its history is packed"
-# Events that advise when to switch.
-_ADVICE: Final = ("switch", "later")
 _NO_EVIDENCE: Final = (
     "neither momenta nor the contact energy are written, so no force can be recognised; write them "
     "(Radioss: /TFILE and /TH/PART with DEF, MASS; LS-DYNA: *DATABASE_GLSTAT and _MATSUM)"
 )
 
 
+class News(NamedTuple):
+    """What a read of the files of a run has shown.
+
+    Attributes
+    ----------
+    start, now : float or None
+        First and last state of the run so far [time]; None if no state is written yet.
+    events : tuple of RunEvent
+        New events.
+    undone_events : tuple of RunEvent
+        Earlier events that the run no longer has, because it was restarted.
+    flight : SeenFlight or None
+        Latest flight.
+    knows_wait : bool
+        True if it is known which force-free time shows a flight.
+    ending : str or None
+        How the run has ended, according to its listing; None if it may still be computed.
+    silence : float or None
+        Time since the run last wrote output [s], if it is so long that it is to be reported.
+    error : D2RPickError or None
+        Why the files cannot be read yet.
+    """
+
+    start: float | None = None
+    now: float | None = None
+    events: tuple[RunEvent, ...] = ()
+    undone_events: tuple[RunEvent, ...] = ()
+    flight: SeenFlight | None = None
+    knows_wait: bool = False
+    ending: str | None = None
+    silence: float | None = None
+    error: D2RPickError | None = None
+
+
 class Watch:
     """Watches a run that is being computed.
 
-    ``names`` are its files or its folder, which need not exist yet.  ``looks`` read the files.  ``ended`` says how the
-    listing reports the end of the run, None before.
+    ``names`` are its files or its folder, which need not exist yet.  ``looks`` read the files.
     """
 
     def __init__(
@@ -57,24 +89,15 @@ class Watch:
         wait: float | None = None,
         inventory: Inventory | None = None,
     ) -> None:
-        self._names, self._parts = names, selection.parts
+        self._names = names
         self.looks = Looks(selection, inventory, wait)
         self._files: dict[str, FileStamp] = {}
-        self._events: tuple[Event, ...] = ()  # Events that have been reported.
-        self._error: FormatError | HistoryError | None = None
-        self._last_time: float | None = None
+        self._events: tuple[RunEvent, ...] = ()  # All events so far.
+        self._news = News()
         self._report_silence_after = _SILENT
-        self._was_over = False  # True if the run seemed over at the first read.
-        self.ended: str | None = None
 
-    @property
-    def _plan(self) -> str:
-        """Return the command that chooses the times of a finished run."""
-        parts = ("--part", ",".join(self._parts)) if self._parts else ()
-        return shlex.join(("d2rpick", "plan", *parts, *self._names))
-
-    def news(self) -> Iterator[Event]:
-        """Return the events since the last read; empty for a run that has not yet begun.
+    def look(self) -> News:
+        """Read what was written since the last read.
 
         Raises
         ------
@@ -83,145 +106,68 @@ class Watch:
             force, or the given wait is too short.
         """
         files = find_files(self._names)
+        news = self._news._replace(events=(), undone_events=(), silence=None)
         if files != self._files:
             self._files = files
             self._report_silence_after = _SILENT
             try:
-                yield from self._read([*files])
-                self._error = None
+                news = self._read([*files], news)._replace(error=None)
             except (FormatError, HistoryError) as error:
                 # The error is not raised, because the solver may be writing to the file at this moment.
-                self._error = error
-        if self._last_time is not None and files and not self.ended:
-            yield from self._check_end([*files][-1])
+                news = news._replace(error=error)
+        if news.now is not None and files:
+            news = news._replace(ending=find_ending([*files][-1]))
         now = time.time()
         silence = now - max((written for _, _, written in files.values()), default=now)
-        if self._error and silence > _SILENT:
-            raise self._error
-        if silence > self._report_silence_after and not self.ended:
+        if news.error and silence > _SILENT:
+            raise news.error
+        if silence > self._report_silence_after and not news.ending:
             self._report_silence_after = 2 * silence
-            message = (
-                f"nothing was written for {silence:.0f} s. If the run is over, choose times with {self._plan}; "
-                "d2rpick follow ends with Ctrl+C, or with --once or --for"
-            )
-            yield self._make_event("silent", message)
+            news = news._replace(silence=silence)
+        self._news = news
+        return news
 
-    def state(self) -> Event:
-        """Return a sentence that states whether the parts are flying now, and since when."""
-        if self._last_time is None:
-            message = f"{list_names(self._names)}: no file of a run yet; check the name if the run has begun"
-            if self._error:
-                message = f"cannot be read yet: {self._error}"
-            return self._make_event("state", message)
-        time, message = None, "no flight yet"
-        for event in self._events:
-            if event.event == "flight":
-                time, message = event.time, f"flies since {event.time:.6g}"
-            elif event.event == "contact":
-                time, message = None, f"no flight since {event.time:.6g}"
-        if self._was_over:
-            message += f"; choose times with {self._plan}"
-        now, evidence = self._last_time, self.looks.evidence
-        wait = evidence.given or evidence.motion.longest(now)
-        if time is None and wait is None:
-            message += (
-                "; the force-free time that marks a flight is unknown: give `wait`"
-            )
-        return Event("state", time, now, message)
-
-    def _read(self, names: Sequence[str]) -> Iterator[Event]:
-        """Read the new states, and return the events that they show."""
+    def _read(self, names: Sequence[str], news: News) -> News:
+        """Read the new states, and add to the news what they show."""
         if not names or not self.looks.look(names):
-            return
+            return news
         evidence = self.looks.evidence
         if not evidence.witnesses:
             raise RangeError(f"{', '.join(names)}: {_NO_EVIDENCE}")
-        now, before = evidence.history.end, self._last_time
-        events = find_events(evidence)
-        pairs = zip(self._events, events, strict=False)
-        kept_count = sum(event == event_before for event, event_before in pairs)
-        if before is None:
-            yield Event(
-                "begun", evidence.history.start, now, self._describe_first_look(now)
-            )
-        elif now < before or kept_count < len(self._events):
-            message = (
-                f"the run was restarted: it was at {before:.6g} and is now at {now:.6g}"
-            )
-            yield Event("restart", now, now, message)
-            yield from _expect_contact(self._events[kept_count:], now)
-        self._last_time, self._events = now, events
-        if before is None and self._was_over:
-            yield from map(_tell_as_past, events)
-        else:
-            yield from events[kept_count:]
-
-    def _describe_first_look(self, now: float) -> str:
-        """Report how far the run is at the first read; if it seems over, refer to ``plan``."""
-        reached = f"the run has reached {now:.6g}"
-        ending = _find_ending([*self._files][-1])
-        written = max(written for _, _, written in self._files.values())
-        silence = time.time() - written
-        if not ending and silence <= _SILENT:
-            return reached
-        self._was_over = True
-        reason = (
-            f"has ended {ending}"
-            if ending
-            else f"seems over: nothing was written for {silence:.0f} s"
+        events_before, self._events = self._events, find_events(evidence)
+        pairs = zip(events_before, self._events, strict=False)
+        # Other values of an event may change in their last digits if all states are read again.
+        are_kept = [before[:3] == event[:3] for before, event in pairs]
+        kept_count = [*are_kept, False].index(False)
+        now, flights = evidence.history.end, evidence.flights()
+        wait = evidence.given or evidence.motion.longest(now)
+        return news._replace(
+            start=evidence.history.start,
+            now=now,
+            events=self._events[kept_count:],
+            undone_events=events_before[kept_count:],
+            flight=flights[-1] if flights else None,
+            knows_wait=wait is not None,
         )
-        return f"{reached} and {reason}; choose times with {self._plan}, because the events below are past"
-
-    def _check_end(self, name: str) -> Iterator[Event]:
-        """Report once that the run has ended, if the listing next to its last file shows this."""
-        self.ended = _find_ending(name)
-        if self.ended:
-            event = "failed" if self.ended == WITH_AN_ERROR else "ended"
-            yield self._make_event(event, f"the run has ended {self.ended}")
-
-    def _make_event(self, event: str, message: str) -> Event:
-        """Return an event at the last state."""
-        return Event(event, self._last_time, self._last_time, message)
-
-
-def _find_ending(name: str) -> str | None:
-    """Return how the run of a history has ended; None if it may still be computed."""
-    return _PACKED if name.endswith(".gz") else find_ending(name)
-
-
-def _tell_as_past(event: Event) -> Event:
-    """Return an event of a finished run, in which an advice cannot be followed any more."""
-    if event.event not in _ADVICE:
-        return event
-    message = f"during the run the advice was: {event.message}"
-    return event._replace(message=message)
-
-
-def _expect_contact(lost_events: Sequence[Event], now: float) -> Iterator[Event]:
-    """Yield an event that announces the first contact among the events that a restart has undone."""
-    times = [event.time for event in lost_events if event.event == "contact"]
-    if times and times[0] is not None and times[0] > now:
-        message = "a contact is expected there, as before the restart"
-        yield Event("expected", times[0], now, message)
 
 
 def follow(
     names: Sequence[str], selection: Selection, wait: float | None = None, inventory: Inventory | None = None,
     *, lasting: float | None = None, rest: Callable[[float], None] = time.sleep,
-) -> Iterator[Event]:  # fmt: skip
-    """Yield the events of a run until it has ended, or for ``lasting`` [s]; see `Watch` for the other arguments."""
+) -> Iterator[News]:  # fmt: skip
+    """Yield the news of a run until it has ended, or for ``lasting`` [s]; see `Watch` for the other arguments."""
     watch = Watch(names, selection, wait, inventory)
     end = time.monotonic() + (float("inf") if lasting is None else lasting)
     while True:
         begun = time.process_time()
-        yield from watch.news()
+        news = watch.look()
+        yield news
         pause = max(_SHORTEST, (time.process_time() - begun) / _SHARE)
         if watch.looks.resume_points:
             # Only the first read covers all states, so the pauses after later reads are short.
             pause = min(pause, _LONGEST)
         remaining = end - time.monotonic()
-        if remaining <= 0 or (watch.ended and lasting is None):
-            yield watch.state()
+        if remaining <= 0 or (news.ending and lasting is None):
             return
         rest(min(pause, remaining))
 

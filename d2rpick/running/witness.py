@@ -1,11 +1,12 @@
-"""Find the force-free time of the given parts, or of the model, at each state of a record from the states so far.
+"""Find, at each state of a record, the force-free time of the given parts or the model from the states so far.
 
 In this time the momentum less gravity and damping is constant within 1e-4 of its largest value so far.  If no momentum
 is written, the contact energy is constant instead.  A flight is seen once this has lasted for the wait, since a force
 that ends may act again: a car hit a block twice, 14 ms apart (docs/reference/first-run.md).
 
 The end of a push that dies away moves the start of the flight a little later as the flight goes on.  A contact moves it
-past the middle of the flight.
+past the middle of the flight.  Without gravity, the end of a push may look like damping, so the force-free time may
+begin in it.  The flight then begins once the momentum itself is constant.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from d2rpick.flight.free_fall import FreeFall
-from d2rpick.flight.window import FEWEST, TOLERANCE, Constant, find_farthest
+from d2rpick.flight.window import FEWEST, TOLERANCE, VISIBLE, Constant, find_farthest
 from d2rpick.running.record import GrowingColumn
 
 if TYPE_CHECKING:
@@ -28,7 +29,10 @@ if TYPE_CHECKING:
     from d2rpick.histories.names import Part
     from d2rpick.running.inner_motion import Wait
 
-# Largest change of a momentum or contact energy that counts as constant, relative to its largest value so far [-].
+    # Returns the gravity between two states, None if another force acts or a support holds parts.
+    FindGravity = Callable[["GrowingWitness", int, int], float | None]
+
+# Changes of a momentum or contact energy up to this fraction of its largest value so far are treated as zero [-].
 # CONSTANT is 10 times the error of single-precision sums.
 CONSTANT: Final = 1e-4
 # Time between two tests for a force, as a fraction of the force-free time so far [-].
@@ -37,7 +41,7 @@ _TEST_AGAIN: Final = 0.25
 _MOST_COMPARED: Final = 128
 
 
-class Quiet(NamedTuple):
+class SeenFlight(NamedTuple):
     """A flight, i.e. a period without force that lasted for the required time.
 
     Attributes
@@ -74,11 +78,15 @@ class Quiet(NamedTuple):
 
 
 class _SampledFall(FreeFall):
-    """Comparison of the law of free fall with a sample of the states in a long window."""
+    """Comparison of the law of free fall with a sample of the states in a long window; no load passes for damping."""
 
     def _select_states(self, first: int, last: int) -> NDArray[np.intp]:
         count = min(last - first + 1, _MOST_COMPARED)
         return np.linspace(first, last, count).round().astype(np.intp)
+
+    def _fitted(self, first: int, last: int) -> tuple[Samples, Samples, float]:
+        p, impulse, alpha = super()._fitted(first, last)
+        return p, impulse, min(alpha, self.limit_damping(first, last))
 
 
 class GrowingWitness:
@@ -92,7 +100,7 @@ class GrowingWitness:
         Numbers in the momenta of the parts that fly together; empty if only the energy of the contacts is written.
     free : list of int
         For each state, the first state of the force-free time that lasts up to it.
-    flights : list of Quiet
+    flights : list of SeenFlight
         Flights so far.
     pauses : list of (float, float)
         Start and end of each force-free time that ended before it was seen as a flight [time].
@@ -103,7 +111,7 @@ class GrowingWitness:
     ) -> None:
         self.members, self.parts = members, parts
         self.free: list[int] = []
-        self.flights: list[Quiet] = []
+        self.flights: list[SeenFlight] = []
         self.pauses: list[tuple[float, float]] = []
         self._columns = GrowingColumn()
         self.time: Samples = self._columns.rows
@@ -151,8 +159,24 @@ class GrowingWitness:
             for law, tolerance in self._laws
         )
 
+    def is_constant(self, first: int, last: int) -> bool:
+        """Return True if the momentum is constant between two states, so that not even gravity acts."""
+        momentum, tolerance = self._get_momentum(first, last)
+        return float(np.ptp(momentum, axis=0).max()) <= 2 * tolerance
+
+    def moves(self, first: int, last: int) -> bool:
+        """Return True if the parts are not at rest between two states."""
+        momentum, tolerance = self._get_momentum(first, last)
+        return float(np.abs(momentum).max()) > VISIBLE * tolerance
+
+    def _get_momentum(self, first: int, last: int) -> tuple[Samples, float]:
+        """Return the momenta from one state to another, and their tolerance at the last one."""
+        momentum = self._columns.rows[first : last + 1, 2:]
+        _, tolerance = self._laws[-1]
+        return momentum, float(tolerance[last])
+
     def _find_first_without_force(self, earliest: int, last: int) -> int:
-        """Return the first state, not before ``earliest``, from which no force acts until the state ``last``."""
+        """Return the first state from ``earliest`` on from which no force acts until the state ``last``."""
         if self.misfit(earliest, last) <= 1:
             return earliest
         return find_farthest(
@@ -162,12 +186,11 @@ class GrowingWitness:
     def examine(
         self,
         find_wait: Callable[[float, float], Wait | None],
-        find_gravity: Callable[[GrowingWitness, int, int], float | None],
+        find_gravity: FindGravity,
     ) -> None:
-        """Add the flights and the ended force-free times that the new states show.
+        """Add the flights and the completed force-free times that the new states show.
 
-        ``find_wait`` returns the waiting time for a flight since a time from the states up to a later one, or None;
-        ``find_gravity`` the gravity between two states, None if another force acts or a support holds parts.
+        ``find_wait`` returns the waiting time for a flight since a time from the states up to a later one, or None.
         """
         time = self.time
         for state in range(self._examined_count, len(self.free)):
@@ -189,17 +212,28 @@ class GrowingWitness:
             ):
                 wait = find_wait(start, now)
                 if wait is not None and now - start >= wait.time:
-                    self._see(first, state, wait, find_gravity(self, first, state))
+                    self._see(first, state, wait, find_gravity)
             self._start = start
         self._examined_count = len(self.free)
 
-    def _see(self, first: int, state: int, wait: Wait, gravity: float | None) -> None:
-        """Record a flight since ``first`` that is detected now; if ``gravity`` is unknown, only schedule a new test."""
+    def _see(
+        self, first: int, state: int, wait: Wait, find_gravity: FindGravity
+    ) -> None:
+        """Record a flight since ``first`` that is detected now; if another force acts, only schedule a new test."""
+        gravity = find_gravity(self, first, state)
         if gravity is None:
             self._test_again_at = state + 1 + int(_TEST_AGAIN * (state - first))
+            # In a flight without gravity, the force-free time may begin in the end of a push.
+            first = find_farthest(
+                state, first, lambda earlier: self.is_constant(earlier, state)
+            )
+            has_lasted = self.time[state] - self.time[first] >= wait.time
+            if has_lasted and first + FEWEST <= state + 1:
+                gravity = find_gravity(self, first, state)
+        if gravity is None:
             return
         self.flights.append(
-            Quiet(
+            SeenFlight(
                 start=float(self.time[first]),
                 seen=float(self.time[state]),
                 end=None,
@@ -213,7 +247,7 @@ class GrowingWitness:
         )
 
     def _find_level(self, first: int, last: int) -> float | None:
-        """Return when the centre of mass is as high again as at ``first`` [time]; None if that is before ``last``."""
+        """Return when the centre of mass is again as high as at ``first`` [time]; None if that is before ``last``."""
         begin, end = self._columns.rows[[first, last]]
         gained = end[2:] - begin[2:]
         time_to_level = (

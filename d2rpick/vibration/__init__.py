@@ -7,7 +7,8 @@ and `model.model_at` decides which one can be relied on at a td:
 1. oscillator (`identify`, `fitting`, `modes`, `span`): E = E_pl + (q_0 + q)^2 with q = exp(-alpha t/2) (a cos omega t
    + b sin omega t), the published floating oscillator (`oscillator`), fitted by least squares in the longest window
    around td in which it describes the record.  Systematic structure in the rest refuses it.
-2. modal (`lines`, `midpoint`, `modal`, `modal_span`, `locked_lines`): any number of modes.  The energy halfway
+2. modal (`lines`, `refined_lines`, `midpoint`, `modal`, `modal_span`, `locked_lines`, `close_modes`): any number of
+   modes.  The energy halfway
    between tr and td gives the product of both deformations, X = V(m) - H(m)/2 + C(m, tau)/2, and with it
    R^2 = 1 + [V(tr) - 2 X]/U(td); H and C follow from the lines of the energy.  Doubts refuse a record or widen
    the band of R.
@@ -66,7 +67,7 @@ if TYPE_CHECKING:
 def find_models(
     history: History, flight: Span, settled: Span, *, together: VibratingTogether
 ) -> dict[str, SignedModel]:
-    """Search a ``flight`` for models of the energy, best model first, until one gives the sign of the deformation.
+    """Search a ``flight`` for models of the energy, best model first, until a model gives the sign of the deformation.
 
     Swings are counted in the flight from when the energy has ``settled``, which may be before it.
     """
@@ -77,7 +78,7 @@ def find_models(
     modal = _find_modal(history, *ends, together=together) if ends else None
     if modal is not None:
         models["modal"] = modal
-        # If the modes are very uncertain, counted half cycles of the energy may be more accurate.
+        # If the modes are very uncertain, the model that counts half cycles of the energy may be more accurate.
         if modal.signed and not modal.is_vague:
             return _rely_on_vague(models)
     ends = get_ends(history.between(*settled)[0])
@@ -107,7 +108,7 @@ def _find_modal(
 
 @remember
 def _find_swings(history: History, first: float, last: float) -> Swings | None:
-    """Count the half cycles of the energy if it returns to a common minimum in each of them."""
+    """Count the half cycles of an energy that returns to a common minimum in each half cycle."""
     from d2rpick.vibration.swings import count_swings
 
     return count_swings(*history.between(first, last))

@@ -1,8 +1,7 @@
-"""Measure the indications that a record is not that of a linear structure in free flight, and explain refusals."""
+"""Measure the signs that a record does not come from a linear structure in free flight, and explain refusals."""
 
 from __future__ import annotations
 
-from itertools import product
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -28,19 +27,19 @@ _MOST_MISFIT: Final = 0.3
 MOST_NEGATIVE, _MOST_NEGATIVE_AT_ALL = 0.07, 0.5
 # Largest accepted change of the static energy in a record, relative to the mean vibration energy [-].
 _MOST_DRIFT: Final = 0.6
-# The overlap may exceed its bounds by at most this fraction of the vibration energy (rms) [-].
+# The overlap of the deformations at tr and td may exceed its bounds by this fraction of the vibration energy [-].
 MOST_BEYOND: Final = 0.12
 # Largest accepted height of the harmonics, relative to their fundamental line [-].
 _MOST_HARMONIC: Final = 0.05
-# _MOST_UNSTRETCHED: largest shortfall of the static energy of a static deformation, per mean vibration energy [-].
+# _MOST_UNSTRETCHED: a static deformation may lack this static energy, relative to the mean vibration energy [-].
 # _MOST_UNSTRETCHED_AT_ALL: limit that replaces _MOST_UNSTRETCHED if there is no better model [-].
 _MOST_UNSTRETCHED, _MOST_UNSTRETCHED_AT_ALL = 0.15, 0.6
-# Smallest number of states in an accepted record per period of the highest-frequency strong line.
+# Smallest number of states per period of the highest-frequency strong line in an accepted record.
 _FEWEST_PER_PERIOD: Final = 2.4
 
 
 class Doubts(NamedTuple):
-    """Indications that a record is not that of a linear structure in free flight; 0 means no doubt [-].
+    """Signs that a record does not come from a linear structure in free flight; 0 means no doubt [-].
 
     ``missed`` and ``misfit`` are relative to the swing of the energy, ``negative``, ``drift`` and ``unstretched`` to
     the mean vibration energy, ``beyond`` to the vibration energy; ``harmonic`` is the size of lines locked to a first
@@ -63,7 +62,7 @@ class Doubts(NamedTuple):
 
     @property
     def refusal_at_all(self) -> str | None:
-        """Return the reason why the record is refused even if there is no better model; None if it is then accepted."""
+        """Return the reason why the record is refused even if no better model exists; None if it is then accepted."""
         return self._first_of(_MOST_NEGATIVE_AT_ALL, _MOST_UNSTRETCHED_AT_ALL)
 
     def _first_of(self, most_negative: float, most_unstretched: float) -> str | None:
@@ -141,10 +140,13 @@ def measure_doubts(
 
 def _measure_beyond_bounds(reading: Reading, grid: Grid) -> float:
     """Return how far the overlap exceeds its bounds (rms over pairs of times), relative to the vibration energy [-]."""
-    even = np.linspace(grid.time[0], grid.time[-1], _CHECKED)
-    pairs = np.array([(tr, td) for tr, td in product(even, even) if tr < td])
-    tr, td = pairs.T
-    beyond = np.maximum(
-        np.abs(reading.free_overlap(tr, td)) - reading.bound(tr, td), 0.0
-    )
-    return float(np.sqrt(np.mean((beyond / reading.level((tr + td) / 2)) ** 2)))
+    # Even times: the middle between any two is one of them or lies between neighbours.
+    even = np.linspace(grid.time[0], grid.time[-1], 2 * _CHECKED - 1)
+    tr, td = np.triu_indices(_CHECKED, 1)
+    middle = tr + td
+    elastic, level = reading.elastic_energy(even), reading.level(even)
+    at_ends = np.maximum(elastic[::2], 0.0)
+    coherence = (reading.earlier(even[::2]) @ reading.later(even[::2]).T).real
+    overlap = (elastic - level / 2)[middle] + coherence[tr, td] / 2
+    beyond = np.maximum(np.abs(overlap) - np.sqrt(at_ends[tr] * at_ends[td]), 0.0)
+    return float(np.sqrt(np.mean((beyond / level[middle]) ** 2)))

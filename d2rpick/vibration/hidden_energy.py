@@ -23,7 +23,7 @@ _HIDDEN_LINES: Final = 12
 def measure_hidden_pairs(
     static: Samples, level: Samples, noise: float, systematic: float
 ) -> float:
-    """Return the vibration energy that has no lines but falls with the ``level``, relative to the level [-].
+    """Return the vibration energy that shows no lines but decays like the ``level``, relative to the level [-].
 
     The lines of two modes with equal frequencies and opposite phases cancel each other, so their energy looks static.
     But static energy stays as it is, while that of modes decays with all others.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cache, partial
+from functools import partial
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -17,15 +17,15 @@ from d2rpick.vibration.modes import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Iterator, Mapping
 
     from numpy.typing import NDArray
 
     from d2rpick.histories.history import Samples
 
-# Unexplained fraction of the variance above which a fit to 400 samples is refused at once [-].
+# A fit to 400 samples is refused at once if it leaves more than this fraction of the variance unexplained [-].
 HOPELESS: Final = 0.5**2
-# A misfit structure larger than this fraction of the fitted energy at the same time indicates a second mode [-].
+# A systematic misfit larger than this fraction of the fitted energy at the same time indicates a second mode [-].
 MAX_LOCAL_STRUCTURE: Final = 0.1
 # Smallest number of samples to which a mode is fitted, four for each parameter of the largest model.
 MIN_SAMPLES: Final = 24
@@ -49,7 +49,7 @@ _MODELS: Final = (
 
 
 class Identification(NamedTuple):
-    """A mode fitted to an energy history, and whether the mode describes the history.
+    """A mode fitted to an energy history, and whether it describes the history.
 
     Parameters
     ----------
@@ -159,23 +159,35 @@ def identify(
             time, "the energy does not oscillate: nothing vibrates, or it is overdamped"
         )
     worst = HOPELESS if quick else np.inf
-    fit_some = cache(
-        lambda size: fitting.fit_few(poles, record.s, record.e, size, worst)
-    )
-    if (
-        quick and fit_some(fitting.WITH_PRELOAD) is None
-    ):  # No other model leaves a smaller misfit than the largest model.
-        return _is_out_of_reach(time)
-    fits = (
-        (fitting.fit(fit_some(size), record.s, record.e, size, worst), size, periods)
-        for size, periods in _MODELS
-    )
-    attempts = (
-        (_evaluate_attempt(parameters, size, record), most_periods)
-        for parameters, size, most_periods in fits
-        if parameters is not None
-    )
+    few_fits: dict[int, Samples | None] = {}
+    if quick:
+        # No other model leaves a smaller misfit than the largest model.
+        largest = fitting.WITH_PRELOAD
+        few_fits[largest] = fitting.fit_few(poles, record.s, record.e, largest, worst)
+        if few_fits[largest] is None:
+            return _is_out_of_reach(time)
+    attempts = _fit_models(poles, record, worst, few_fits)
     return _choose_first_to_follow(attempts, record)
+
+
+def _fit_models(
+    poles: NDArray[np.complex128],
+    record: _Record,
+    worst: float,
+    few_fits: Mapping[int, Samples | None],
+) -> Iterator[tuple[_Attempt, float]]:
+    """Yield a fit of each model that is not hopeless, with the number of periods needed to identify the model.
+
+    ``few_fits`` contains fits to a selection of samples that are already known, by the number of parameters.
+    """
+    for size, most_periods in _MODELS:
+        if size in few_fits:
+            few_fit = few_fits[size]
+        else:
+            few_fit = fitting.fit_few(poles, record.s, record.e, size, worst)
+        parameters = fitting.fit(few_fit, record.s, record.e, size, worst)
+        if parameters is not None:
+            yield _evaluate_attempt(parameters, size, record), most_periods
 
 
 def find_rates(time: Samples, energy: Samples) -> NDArray[np.complex128]:
@@ -305,7 +317,7 @@ class _Record(NamedTuple):
 
 
 def _refuse_short_record(time: Samples, energy: Samples) -> Identification | None:
-    """Return a refusal if the record is too short to be judged, otherwise None."""
+    """Return a refusal if the record is too short to be judged; otherwise None."""
     if time.size < MIN_SAMPLES:
         states_text = "1 state" if time.size == 1 else f"{time.size} states"
         return _refuse_without_fit(
@@ -344,7 +356,7 @@ def _evaluate_attempt(parameters: Samples, size: int, record: _Record) -> _Attem
 def _judge_attempt(
     attempt: _Attempt, least_periods: float, record: _Record
 ) -> Identification:
-    """Return the result for a fit with its verdict."""
+    """Return the identified mode with the verdict on its fit."""
     s = record.s
     e = record.e
     density = count_samples_per_period(

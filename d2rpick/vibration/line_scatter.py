@@ -49,10 +49,11 @@ class LineScatter:
     def _spread(self) -> Samples:
         """Return a square root of the parameters' covariance matrix, shape (p, p)."""
         spectrum = self.reading.spectrum
-        waves = self._scale_by_gain(spectrum.lines)
-        mean = self._scale_by_gain(spectrum.mean)
+        averaged = spectrum.average_blocks(self.grid)
         times = self.grid.time
-        design = np.hstack([_differentiate_waves(waves, times), mean.waves(times).real])
+        design = np.hstack(
+            [averaged.lines.differentiate(times), averaged.mean.waves(times).real]
+        )
         freedom = max(times.size - design.shape[1], 1)
         shared = min(self.systematic, _MOST_SHARED)
         # The number of independent states follows from a first-order autoregressive model.
@@ -76,19 +77,15 @@ class LineScatter:
         of_mean = np.maximum(np.abs(spectrum.mean.weights), self.reading.tiny)
         return np.concatenate([sizes, sizes, decays, rates, of_mean])
 
-    def _scale_by_gain(self, waves: Exponentials) -> Exponentials:
-        """Return the waves with the weights that give their means over the blocks of the grid."""
-        return waves._replace(weights=waves.weights * self.grid.gain(waves.poles))
-
     def _compute_gradient(self, tr: Samples, td: Samples) -> Samples:
-        """Return the derivatives of the squared residual by the parameters, shape (n, p) [1/energy, time/1].
+        """Return the derivatives of the squared residual by all parameters, shape (n, p) [1/energy, time/1].
 
         R^2 = 1 + [V(tr) - 2 V(m) + H(m) - C(tr, td)] / H(td), the small change of U within a period left out.
         """
         reading = self.reading
         lines = reading.spectrum.lines
         middle = (tr + td) / 2
-        lost = _differentiate_waves(lines, tr) - 2 * _differentiate_waves(lines, middle)
+        lost = lines.differentiate(tr) - 2 * lines.differentiate(middle)
         raised = (1 + reading.hidden_pairs) * np.tile(reading.is_mode, 4)
         lost = lost - _differentiate_coherence(lines, tr, td) * raised
         of_level = np.zeros_like(lost)
@@ -109,16 +106,6 @@ class LineScatter:
             (gradient - (squared - 1)[:, np.newaxis] * level_gradient)
             / level[:, np.newaxis]
         )
-
-
-def _differentiate_waves(waves: Exponentials, times: Samples) -> Samples:
-    """Return the derivatives of the sum of k waves with respect to their 4 k parameters at times (n,), shape (n, 4 k).
-
-    The derivatives are with respect to the real and imaginary parts of the weights, then of the poles.
-    """
-    courses = waves.waves(times)
-    moved = courses * waves.weights * (times - waves.origin)[:, np.newaxis]
-    return np.hstack([courses.real, -courses.imag, moved.real, -moved.imag])
 
 
 def _differentiate_level(waves: Exponentials, times: Samples) -> Samples:

@@ -27,8 +27,8 @@ if TYPE_CHECKING:
 # Numbers of exponentials that are tried; each spectral line needs two, and the mean needs at least one.
 _ORDERS: Final = (3, 5, 7, 9, 11, 13, 17, 21, 27, 35, 45, 57, 71)
 # _CLEARLY_BETTER: more exponentials are preferred if they reduce the prediction error to this fraction or less [-].
-# _PERFECT: relative prediction error below which no more exponentials are tried [-].
-_CLEARLY_BETTER, _PERFECT = 0.8, 2e-4
+# PERFECT: relative prediction error below which no more exponentials are tried [-].
+_CLEARLY_BETTER, PERFECT = 0.8, 2e-4
 # _BETTER: fraction that replaces _CLEARLY_BETTER if the misfit still contains a spectral line [-].
 # _OF_A_LINE: a misfit contains a spectral line if its largest power is at least this multiple of the mean power [-].
 _BETTER, _OF_A_LINE = 0.97, 16.0
@@ -55,9 +55,9 @@ _EARLY: Final = 0.25
 # _MOST_DECAY: largest exponent with which a line decays within the record [-].
 _LEAST_TURNS, _SURE_TURNS, _MOST_DAMPED, _MOST_DECAY = 0.25, 1.0, 0.35, 40.0
 # Largest exponent by which noise may make a vibration seem to grow over the record [-].
-_MOST_GROWTH: Final = 0.2
+MOST_GROWTH: Final = 0.2
 # _MOST_DECAYS: largest number of decaying exponentials that the mean contains in addition to a constant.
-# _SAME_DECAY: smallest difference between the exponents by which two exponentials decay over the record [-].
+# _SAME_DECAY: two exponentials are distinguished if their decays over the record differ by at least this exponent [-].
 _MOST_DECAYS, _SAME_DECAY = 4, 0.05
 
 
@@ -84,9 +84,9 @@ class Grid(NamedTuple):
         """Return the time from the first block to the last block [time]."""
         return float(self.time[-1] - self.time[0])
 
-    def first(self, count: int) -> Grid:
-        """Return a grid with the first ``count`` blocks."""
-        return self._replace(time=self.time[:count], energy=self.energy[:count])
+    def some(self, blocks: slice) -> Grid:
+        """Return a grid with some successive blocks."""
+        return self._replace(time=self.time[blocks], energy=self.energy[blocks])
 
     def waves(self, poles: Complex) -> Complex:
         """Return exp(p (t - t_0)) at the m times t of the grid, where t_0 is the first time; shape (m, poles) [-].
@@ -184,6 +184,15 @@ class Exponentials(NamedTuple):
             np.multiply.outer(np.asarray(t, dtype=np.float64) - self.origin, self.poles)
         )
 
+    def differentiate(self, times: Samples) -> Samples:
+        """Return the derivatives of the sum at times (n,) with respect to its 4 k parameters, shape (n, 4 k).
+
+        The parameters are the real and imaginary parts of the weights, then those of the poles.
+        """
+        courses = self.waves(times)
+        moved = courses * self.weights * (times - self.origin)[:, np.newaxis]
+        return np.hstack([courses.real, -courses.imag, moved.real, -moved.imag])
+
     def some(self, which: NDArray[np.bool_]) -> Exponentials:
         """Return the waves selected by a mask."""
         return Exponentials(self.poles[which], self.weights[which], self.origin)
@@ -198,7 +207,7 @@ class Spectrum(NamedTuple):
 
     @property
     def error(self) -> float:
-        """Return the rms misfit [energy]."""
+        """Return the rms misfit of the spectrum [energy]."""
         return float(np.sqrt(np.mean(self.rest**2)))
 
     def turned(self) -> Spectrum:
@@ -223,6 +232,14 @@ class Spectrum(NamedTuple):
             weights=np.concatenate([self.mean.weights, slow.weights]),
         )
         return self._replace(lines=self.lines.some(~is_slow), mean=mean)
+
+    def average_blocks(self, grid: Grid) -> Spectrum:
+        """Return the spectrum whose values are the means over the blocks of a grid, with the same misfit."""
+        lines, mean = (
+            waves._replace(weights=waves.weights * grid.gain(waves.poles))
+            for waves in (self.lines, self.mean)
+        )
+        return self._replace(lines=lines, mean=mean)
 
     def at(self, t: Samples | float) -> Samples:
         """Return the energy at each time, with the shape of ``t`` [energy]."""
@@ -264,8 +281,9 @@ def predict(grid: Grid) -> Prediction | None:
     )
     if not swing > 0:
         return None
-    first = grid.first(int(FIRST_PART * grid.time.size))
-    rest_of_grid = slice(first.time.size, None)
+    size_of_first = int(FIRST_PART * grid.time.size)
+    first = grid.some(slice(size_of_first))
+    rest = grid.some(slice(size_of_first, None))
     space = _SignalSpace.of(first)
     tried: list[tuple[float, int, bool, Spectrum]] = []
     for order in _ORDERS:
@@ -274,14 +292,12 @@ def predict(grid: Grid) -> Prediction | None:
         poles = space.poles(order)
         for every_decay in (False, True):
             spectrum = fit_spectrum(first, poles, grid.span, every_decay=every_decay)
-            predicted = _average_blocks(spectrum, grid.time[rest_of_grid], grid)
-            error = float(
-                np.sqrt(np.mean((predicted - grid.energy[rest_of_grid]) ** 2))
-            )
+            predicted = _average_blocks(spectrum, rest)
+            error = float(np.sqrt(np.mean((predicted - rest.energy) ** 2)))
             missed = float(np.hypot(error, spectrum.error)) / swing
             if not tried or missed < _get_needed(tried[-1][3]) * tried[-1][0]:
                 tried.append((missed, order, every_decay, spectrum))
-        if tried[-1][0] < _PERFECT:
+        if tried[-1][0] < PERFECT:
             break
     if not tried:
         return None
@@ -292,14 +308,14 @@ def predict(grid: Grid) -> Prediction | None:
 
 
 def _get_needed(spectrum: Spectrum) -> float:
-    """Return the factor by which more exponentials must reduce the prediction error of a spectrum [-]."""
+    """Return the factor by which additional exponentials must reduce the prediction error of a spectrum [-]."""
     powers = np.abs(np.fft.rfft(spectrum.rest)) ** 2
     typical = float(np.mean(powers))
     return _BETTER if powers.max() > _OF_A_LINE * typical else _CLEARLY_BETTER
 
 
 class _SignalSpace:
-    """The signal subspace, spanned by the windows of a record, with its directions in descending order of size."""
+    """The signal subspace spanned by the windows of a record; its directions are in descending order of size."""
 
     def __init__(self, vectors: Samples, step: float) -> None:
         self.vectors, self.step = vectors, step
@@ -308,7 +324,10 @@ class _SignalSpace:
     def of(cls, grid: Grid) -> _SignalSpace:
         """Compute the signal subspace of a grid."""
         lags = min(grid.time.size // 2, _MOST_LAGS)
-        windows = np.lib.stride_tricks.sliding_window_view(grid.energy, lags)
+        # A copy, which is multiplied by itself in half the time of overlapping views.
+        windows = np.ascontiguousarray(
+            np.lib.stride_tricks.sliding_window_view(grid.energy, lags)
+        )
         return cls(np.linalg.eigh(windows.T @ windows)[1][:, ::-1], grid.step)
 
     @property
@@ -329,11 +348,17 @@ class _SignalSpace:
 def fit_spectrum(
     grid: Grid, poles: Complex, span: float, *, every_decay: bool = False
 ) -> Spectrum:
-    """Fit lines and mean with the given poles to a grid; poles must differ within ``span`` [time].
+    """Fit lines and a mean with the given poles to a grid.
+
+    Decays that cannot be distinguished within ``span`` are merged.
 
     If ``every_decay`` is True, the mean contains the decay of each line, which noise permits only for few lines.
     """
-    lines, mean = _split(poles, span, every_decay=every_decay)
+    return fit_weights(grid, *_split(poles, span, every_decay=every_decay))
+
+
+def fit_weights(grid: Grid, lines: Complex, mean: Complex) -> Spectrum:
+    """Fit the weights of lines and of a mean, whose poles are given, to a grid."""
     all_poles = np.concatenate([lines, mean])
     waves = grid.waves(all_poles) * grid.gain(all_poles)
     swinging = all_poles.imag > 0
@@ -351,32 +376,40 @@ def fit_spectrum(
     )
 
 
-def _average_blocks(spectrum: Spectrum, time: Samples, grid: Grid) -> Samples:
-    """Return the means of a spectrum over blocks centred at the given times [energy]."""
-    waves_and_mean = (spectrum.lines, spectrum.mean)
-    means = [
-        (waves.waves(time) @ (waves.weights * grid.gain(waves.poles))).real
-        for waves in waves_and_mean
-    ]
-    return np.asarray(means[0] + means[1])
+def _average_blocks(spectrum: Spectrum, grid: Grid) -> Samples:
+    """Return the means of a spectrum over the blocks of a grid, shape (m,) [energy]."""
+    parts = (spectrum.lines, spectrum.mean)
+    poles = np.concatenate([part.poles for part in parts])
+    weights_at_start = np.concatenate(
+        [part.weights * part.waves(grid.time[0]) for part in parts]
+    )
+    means = grid.waves(poles) @ (weights_at_start * grid.gain(poles))
+    return np.asarray(means.real)
 
 
 def _split(
     poles: Complex, span: float, *, every_decay: bool
 ) -> tuple[Complex, Complex]:
     """Separate the poles of lines from those of the mean: a constant, decays, and very slow oscillations."""
-    decay = np.maximum(-poles.real, -_MOST_GROWTH / span)
+    decay = np.maximum(-poles.real, -MOST_GROWTH / span)
     rate = poles.imag
-    turns = rate * span / (2 * np.pi)
-    lasting = decay * span < _MOST_DECAY
-    is_line = (turns > _LEAST_TURNS) & (decay < _MOST_DAMPED * rate) & lasting
-    is_slow = (rate >= 0) & ~is_line & (turns < _LEAST_TURNS) & lasting
+    is_line = are_lines(poles, span)
+    is_short_of_line = rate * span < 2 * np.pi * _LEAST_TURNS
+    is_slow = (rate >= 0) & is_short_of_line & (decay * span < _MOST_DECAY)
     decays = np.concatenate([decay[is_line], decay[is_slow]])
     if not every_decay:
         decays = _few_of(decays, span)
     slow = rate[is_slow & (rate * span > 0.5)]
     mean = np.concatenate([[0.0], -decays, 1j * slow])
     return -decay[is_line] + 1j * rate[is_line], mean.astype(np.complex128)
+
+
+def are_lines(poles: Complex, span: float) -> NDArray[np.bool_]:
+    """Return a mask of the poles that can be lines of modes in a record of the length ``span`` [time]."""
+    decay = -poles.real
+    has_turned = poles.imag * span > 2 * np.pi * _LEAST_TURNS
+    is_weakly_damped = decay < _MOST_DAMPED * poles.imag
+    return np.asarray(has_turned & is_weakly_damped & (decay * span < _MOST_DECAY))
 
 
 def _few_of(decays: Samples, span: float) -> Samples:

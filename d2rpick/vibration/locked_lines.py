@@ -156,7 +156,7 @@ class ThirdHarmonic(NamedTuple):
 
     @property
     def is_of_spring(self) -> bool:
-        """Return True if the line is as high as for a stiffening spring, and too high to be noise."""
+        """Return True if the line is as high as the third harmonic of a stiffening spring, and too high to be noise."""
         is_seen = self.expected > 2 * ABOVE_SCATTER * self.scatter
         return self.may_be_of_spring and is_seen
 
@@ -192,7 +192,7 @@ def measure_third_harmonic(
     height = float(abs(first))
     # The third harmonic of a spring has three times the phase of the first one.
     turned_back = third * (first.conj() / abs(first)) ** 3
-    # A line that decays is visible in only a part of the window.
+    # A decaying line is visible in only a part of the window.
     widening = float(np.exp(max(-third_pole.real, 0.0) * span / 2))
     return ThirdHarmonic(
         second / height,

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from d2rpick.histories.history import Samples
+    from d2rpick.vibration.amplitudes import SignedAmplitudes
     from d2rpick.vibration.modes import Mode
 
     # Values for n times, as arrays of shape (n,) keyed by name; unknown values are NaN.
@@ -124,7 +125,7 @@ def level_error(energy: Samples | float, level: Samples | float) -> Samples:
     comparable = (energy >= 0) & (level > 0)
     with np.errstate(
         over="ignore"
-    ):  # Relative to a level near zero, the error of any other energy may overflow to infinity.
+    ):  # If the level is near zero, the relative error of any other energy may overflow to infinity.
         square = np.divide(
             energy, level, out=np.full(energy.shape, np.nan), where=comparable
         )
@@ -164,6 +165,14 @@ def sign_match(
     deformation does not decide.
     """
     return np.asarray(vibration.overlap(tr, td) >= 0)
+
+
+def compare_signed(
+    vibration: SignedAmplitudes, tr: Samples, td: float
+) -> tuple[Samples, NDArray[np.bool_]]:
+    """Return `lock_in_error` and `sign_match` of each tr, from one evaluation of its deformation."""
+    separation, overlap = vibration.compare(tr, td)
+    return np.sqrt(separation) / np.sqrt(vibration.vibration_energy(td)), overlap >= 0
 
 
 def band_about(
@@ -272,12 +281,12 @@ def _leaving(mode: Mode, edges: Samples, wanted: Samples, room: Samples) -> Samp
     middle = wanted[column]
     tolerated = room[column]
     side = np.sign(mode.deformation(outer) - middle)
-    leaving_time = narrow_brackets(
-        lambda t: tolerated - side * (mode.deformation(t) - middle),
-        inner,
-        outer,
-        slope=lambda t: -side * mode.velocity(t),
-    )
+
+    def stay_within(t: Samples) -> tuple[Samples, Samples]:
+        q, velocity = mode.motion(t)
+        return tolerated - side * (q - middle), -side * velocity
+
+    leaving_time = narrow_brackets(stay_within, inner, outer)
     distances = np.full(room.size, np.inf)
     distances[column] = np.abs(leaving_time.at - edges[0, column])
     return distances

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Reading:
-    """An interpretation of a spectrum, which states which of its lines are modes.
+    """An interpretation of a spectrum: which of its lines are modes.
 
     ``is_mode`` (k,) marks modes; other lines are those of a stretch, which does not vibrate.  If ``no_static`` is True
     all of the mean is vibration, else the modes have half of it and the rest is static.  ``rest`` is the part of the
@@ -128,18 +128,16 @@ class Reading:
         return self.modes._replace(poles=self.modes.poles / 2).waves(td)
 
     def overlap(self, tr: Samples | float, td: Samples | float) -> Samples:
-        """Return X, the product of the deformations at tr and td, clipped to its bounds [energy]."""
-        bound = self.bound(tr, td)
-        return np.clip(self.free_overlap(tr, td), -bound, bound)
+        """Return X, the product of the deformations at tr and td [energy].
 
-    def free_overlap(self, tr: Samples | float, td: Samples | float) -> Samples:
-        """Return X without clipping; noise or a wrong model may make X exceed its bounds [energy]."""
+        It is clipped to its bounds, which noise or a wrong model may make it exceed.
+        """
         middle = (np.asarray(tr) + td) / 2
-        return (
-            self.elastic_energy(middle)
-            - self.level(middle) / 2
-            + self.coherence(tr, td) / 2
-        )
+        level = self.level(middle)
+        coherence = self.coherence(tr, td)
+        free = self.elastic_energy(middle) - level / 2 + coherence / 2
+        bound = self.bound(tr, td)
+        return np.clip(free, -bound, bound)
 
     def bound(self, tr: Samples | float, td: Samples | float) -> Samples:
         """Return the largest product that deformations with these energies can have [energy]."""

@@ -15,6 +15,7 @@ import numpy as np
 from d2rpick.base.caching import cached_property
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.vibration import measures
+from d2rpick.vibration.close_modes import find_close_modes
 from d2rpick.vibration.doubts import (
     MOST_BEYOND,
     MOST_NEGATIVE,
@@ -34,6 +35,7 @@ from d2rpick.vibration.locked_lines import (
 from d2rpick.vibration.measures import Profile
 from d2rpick.vibration.midpoint import Reading
 from d2rpick.vibration.modes import SOLVER_FLOOR
+from d2rpick.vibration.refined_lines import refine_prediction
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -75,7 +77,7 @@ _FINER: Final = 4
 _LITTLE_LEFT, _LITTLE_MISSED, _EXACT, _SLOW_TOO = 0.05, 0.2, 0.1, 0.2
 
 # _LEAST_HALF: half-width of the error band of the squared residual before known errors widen the band [-].
-# _NOT_LINEAR: relative error of a deformation because real structures are nonlinear [-].
+# _NOT_LINEAR: relative error of a deformation that results from the nonlinearity of real structures [-].
 # The residual R of a shell box deviated by 0.015 to 0.018 (rms) from the R computed with all its nodes.
 _LEAST_HALF, _NOT_LINEAR = 0.006, 0.015
 # Modes are poorly identified if the half-width of the error band of the squared residual exceeds this [-].
@@ -91,7 +93,7 @@ _CHANCE: Final = 2.0
 # _NEGATIVE_COUNTS: effect of a negative or too small static energy on the squared residual, per relative error [-].
 _DRIFT_COUNTS, _NEGATIVE_COUNTS = 0.35, 1.4
 # _BENT_ALIKE: effect of the second harmonic of a stiffening spring on the squared residual of equal deformations [-].
-# _BENT_ACROSS: additional effect of the second harmonic on the squared residual of orthogonal deformations [-].
+# _BENT_ACROSS: additional effect of the second harmonic on the squared residual if the deformations are orthogonal [-].
 _BENT_ALIKE, _BENT_ACROSS = 3.0, 5.0
 # Largest possible squared residual, which is that of equal and opposite deformations [-].
 _MOST_OPPOSED: Final = 4.0
@@ -138,6 +140,8 @@ class ModalVibration:
         States of the record in a period of the fastest line that is told from noise [-].
     scatter : LineScatter
         Scatter of the squared residual that follows from that of the record.
+    with_close_modes : Reading or None
+        Interpretation in which one line is that of two close modes, and no energy is static.
     swinging : float
         Mean energy in parts of the record that swing in a way that no mode does [energy].
     bent : float
@@ -160,6 +164,7 @@ class ModalVibration:
     systematic: float
     states_per_period: float
     scatter: LineScatter
+    with_close_modes: Reading | None = None
     swinging: float = 0.0
     bent: float = 0.0
     source: str = "internal energy"
@@ -181,12 +186,12 @@ class ModalVibration:
 
     @property
     def convinces(self) -> bool:
-        """Return True if the modes predict the record so well that no load can act in it."""
+        """Return True if the modes predict the record so accurately that no load can act in it."""
         return self._predicts_within(1.0)
 
     @property
     def is_exact(self) -> bool:
-        """Return True if the modes predict the record much better than required."""
+        """Return True if the modes predict the record much more accurately than required."""
         return self._predicts_within(_EXACT)
 
     def _predicts_within(self, share: float) -> bool:
@@ -218,7 +223,7 @@ class ModalVibration:
         return min(float(self.time[0]), td)
 
     def known_at(self, td: float) -> bool:
-        """Return True if the modes were identified at td and their energy exceeds the error of the solver."""
+        """Return True if the modes were identified at td and their energy exceeds the solver error."""
         level = self.reading.level(np.append(self.time[[0, -1]], td))
         return bool(
             self.time[0] <= td <= self.time[-1]
@@ -353,7 +358,7 @@ class ModalVibration:
         return measures.band_about(np.square(stated), off, above, below)
 
     def unseen(self, tr: Samples | float, td: float) -> Samples:
-        """Return the fraction of vibration energy at td that a hidden mode needs to explain the band of each tr [-].
+        """Return the vibration energy fraction that a hidden mode needs at td to explain the error band of each tr [-].
 
         A hidden mode in opposite phase at tr and td adds four times its share to the squared residual.
         """
@@ -396,7 +401,8 @@ class ModalVibration:
 
         Part of the static energy may be due to spectral lines hidden in the misfit.  That part is limited by the energy
         that the misfit can hide, and by the static energy itself.  A mode that does not complete a cycle is confused
-        with slow decays, so what the first part of the record says of it is another interpretation.
+        with slow decays, so what the first part of the record says of it is another interpretation.  So are two close
+        modes, whose beat seems to be static energy.
         """
         none = np.zeros(squared.shape)
         shifts = [reading.residual_squared(tr, td) - squared for reading in self.others]
@@ -405,6 +411,8 @@ class ModalVibration:
             shifts.append(hidden / self.reading.level(td) * (1.5 - squared))
             nearest = np.argmin(np.abs(shifts), axis=0)
             shifts = [np.take_along_axis(np.array(shifts), nearest[np.newaxis], 0)[0]]
+        if self.with_close_modes is not None:
+            shifts.append(self.with_close_modes.residual_squared(tr, td) - squared)
         if self.has_slow_mode:
             first = self.of_first_part.residual_squared(tr, td)
             shifts.append(first - squared)
@@ -415,7 +423,7 @@ class ModalVibration:
 
     @cached_property
     def has_slow_mode(self) -> bool:
-        """Return True if the energy of some mode does not complete a cycle in the window."""
+        """Return True if the energy of at least one mode does not complete a cycle in the window."""
         window = float(self.time[-1] - self.time[0])
         return bool(np.any(self.reading.modes.poles.imag * window < 2 * np.pi))
 
@@ -464,6 +472,7 @@ def identify_modal(
         np.abs(energy).max()
     ):
         return None
+    prediction = refine_prediction(grid, prediction)
     misfit = prediction.spectrum.error / prediction.swing
     systematic = _correlate_neighbours(prediction.spectrum.rest)
     if not _predicts_within(_SLOW_TOO, prediction.missed, misfit, systematic):
@@ -507,7 +516,7 @@ def _can_decide(internal: ModalVibration, kinetic: ModalVibration) -> bool:
 def _predicts_within(
     share: float, missed: float, misfit: float, systematic: float
 ) -> bool:
-    """Return True if the error of the lines, apart from white noise, is below ``share`` of the acceptable error.
+    """Return True if the error of the lines, apart from white noise, is below the ``share`` of the acceptable error.
 
     ``missed`` and ``misfit`` as in `Doubts`; neighbouring states share the fraction ``systematic``.
     """
@@ -566,6 +575,9 @@ def _read(
     scatter = spectrum.error * np.sqrt(2 / grid.time.size)
     systematic = _correlate_neighbours(spectrum.rest)
     stretches, springs = _separate_stretches_from_springs(spectrum, grid, scatter)
+    close_modes = None
+    if not (kinetic or stretches or springs):
+        close_modes = find_close_modes(grid, prediction)
     may_be_spring = any(not third.is_of_spring for third in springs)
     plain = Reading(
         spectrum,
@@ -597,6 +609,9 @@ def _read(
         reading=reading,
         others=interpretation.others,
         of_first_part=_read_first_part(reading, prediction, grid, stretches, scatter),
+        with_close_modes=None
+        if close_modes is None
+        else _read_close_modes(reading, close_modes),
         doubts=doubts,
         noise=spectrum.error,
         systematic=systematic,
@@ -611,7 +626,7 @@ def _read(
 
 
 def _add_hidden_pairs(reading: Reading, systematic: float) -> Reading:
-    """Return a reading with the vibration energy that has no lines, from what its own modes leave of the mean."""
+    """Add to an interpretation the vibration energy without lines that its own modes leave in the mean energy."""
     spectrum = reading.spectrum
     level = reading.level_of_modes(reading.times)
     static = spectrum.mean.at(reading.times) - level / 2
@@ -687,6 +702,17 @@ def _read_first_part(
     )
 
 
+def _read_close_modes(reading: Reading, spectrum: Spectrum) -> Reading:
+    """Return the interpretation of a ``spectrum`` with two close modes, all lines of which are modes."""
+    return replace(
+        reading,
+        spectrum=spectrum,
+        is_mode=np.ones(spectrum.lines.poles.size, dtype=bool),
+        no_static=False,
+        hidden_pairs=0.0,
+    )
+
+
 def _compute_effect_of_deformation(off: Samples | float, squared: Samples) -> Samples:
     """Return the error of the squared residual due to the relative error ``off`` of a deformation difference [-]."""
     return np.asarray(2 * off * np.sqrt(squared) + np.square(off))
@@ -698,7 +724,7 @@ def _compute_sine(squared: Samples) -> Samples:
 
 
 def _count_states(lines: Exponentials, grid: Grid, scatter: float) -> float:
-    """Return the number of states per period of the highest-frequency relevant line that is stronger than noise."""
+    """Return the number of states per period of the highest-frequency relevant line that exceeds the noise."""
     sizes = np.abs(lines.weights)
     least = max(NOTABLE * float(sizes.max(initial=0.0)), ABOVE_SCATTER * scatter)
     fastest = float(lines.poles.imag[sizes > least].max(initial=0.0))

@@ -91,6 +91,16 @@ class Mode(SignedAmplitudes):
         """Return dq/dt [sqrt(energy)/time]."""
         return self._swing(t, *self._velocity_parts)
 
+    def motion(self, t: Samples) -> tuple[Samples, Samples]:
+        """Return `deformation` and `velocity` from one evaluation, in the shape of ``t``."""
+        s = t - self.origin
+        angle = self.omega * s
+        decay = np.exp(-self.alpha / 2 * s)
+        cos, sin = np.cos(angle), np.sin(angle)
+        cosine, sine = self._velocity_parts
+        q = self.preload + decay * (self.cosine * cos + self.sine * sin)
+        return q, decay * (cosine * cos + sine * sin)
+
     def amplitudes(self, t: Samples | float) -> Samples:
         """Return the signed deformation, in the shape of ``t`` with a first axis of length one [sqrt(energy)]."""
         return self.deformation(t)[np.newaxis]
@@ -216,10 +226,14 @@ class Mode(SignedAmplitudes):
         row, cell = np.nonzero(above[:, :-1] * above[:, 1:] < 0)
         side = np.sign(above[row, cell])
         wanted = levels[row]
+
+        def rise_above(t: Samples) -> tuple[Samples, Samples]:
+            q, velocity = self.motion(t)
+            return side * (q - wanted), side * velocity
+
         times = narrow_brackets(
-            lambda t: side * (self.deformation(t) - wanted), edges[row, cell], edges[row, cell + 1],
-            slope=lambda t: side * self.velocity(t), steps=_STEPS,
-        )  # fmt: skip
+            rise_above, edges[row, cell], edges[row, cell + 1], _STEPS
+        )
         return row, times.at
 
     @property

@@ -143,7 +143,7 @@ class OscillatorEnergy(SampledEnergy):
         ):
             return None  # Even if all of the misfit were here, it would be too small.
         scatter = float(np.sqrt(np.mean((energy - self.mode.energy(time)) ** 2)))
-        # Both energies may underflow to 0.
+        # Both energies may underflow to zero.
         if vibration > 0 and scatter <= _DROWNED * vibration:
             return None
         finding = f"at td the vibration energy {vibration:.3g} is below the noise of the record, {scatter:.3g}"
@@ -188,7 +188,7 @@ class OscillatorEnergy(SampledEnergy):
 
     def standstills(self) -> Samples:
         """Return the times in the span, up to td, at which the energy has an extremum [time]."""
-        # td itself may be an extremum, which rounding may place before td.
+        # td itself may be an extremum that rounding places before td.
         end = self.td - _ZERO / self.mode.omega
         times = np.maximum(self.mode.extrema(self.before, end), self.span.start)
         return times[self.within(times)]
@@ -314,7 +314,7 @@ def find_moments_of_mode(
         [*(up for _, up in early), mode.energy_slopes(times)[0] > 0]
     )
     turns = seen[int(td.argmax())].standstills()
-    # td itself may be an extremum, which rounding may place before td.
+    # td itself may be an extremum that rounding places before td.
     of, which = np.nonzero(turns < (td - _ZERO / mode.omega)[:, np.newaxis])
     near = measures.lock_in_error(mode, turns[which], td[of]) <= tolerance
     moments = Moments.of_level(

@@ -242,7 +242,7 @@ class Oscillator:
         kappa = np.sqrt(-square)
         slow_rate = self.omega_0**2 / (self.alpha / 2 + kappa)
         slow = np.exp(-slow_rate * t)
-        # The ratio is that of the faster exponential to the slower one.
+        # The ratio divides the faster exponential by the slower one.
         ratio = np.exp(-2 * kappa * t)
         difference = -np.expm1(-2 * kappa * t)
         return slow * (1 + ratio) / 2, slow * difference / (2 * kappa)

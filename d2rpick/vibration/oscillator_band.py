@@ -55,7 +55,7 @@ def residual_band(
         squared, off, hidden, fit.hidden_share * squared
     )
     # A hidden mode is assumed to exist with a probability of 1/2.
-    # The stated residual therefore includes half of the effect that exceeds the solver errors.
+    # The stated residual therefore includes half of the hidden mode's effect beyond the solver error.
     solver_error = SMALLEST * mode.vibration_energy(tr) / mode.vibration_energy(td)
     beyond_solver = np.maximum(
         max(fit.hidden_share - SMALLEST, 0.0) * opposed, decayed - solver_error

@@ -58,7 +58,7 @@ MOST_REFITS = 8
 
 # Hidden modes with at most this fraction of the vibration energy are treated as solver errors and ignored [-].
 SMALLEST: Final = 1e-3
-# Largest number of lines in a spectrum, which suffices for 800 energy periods.
+# Largest number of lines in a spectrum, which is enough for 800 energy periods.
 _MOST_LINES: Final = 8192
 # Number of points per line of a spectrum, sufficient to resolve the peak of the line.
 _FINER: Final = 4
@@ -179,7 +179,9 @@ def _estimate_what_is_hidden(
 def find_described_span(
     search: SpanSearch, td: float
 ) -> tuple[Span | None, Identification]:
-    """Find the longest window around td that a single oscillator describes; otherwise, the last such window before td.
+    """Find the longest window around td that a single oscillator describes.
+
+    If there is none, use the last one before td.
 
     First the search tries parts of the record, long ones first, until one oscillator describes a part.  Then the window
     grows both ways while the samples follow the fit, is fitted anew, and so on until it no longer changes.

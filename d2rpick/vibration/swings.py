@@ -33,7 +33,7 @@ _MOST_OFF: Final = 0.1
 # Smallest number of minima that define a lower envelope.
 _FEWEST: Final = 5
 # Smallest relative difference in length of neighbouring half cycles in a beat [-].
-# The difference in length is about half of the energy fraction of the other mode, which is therefore 0.02.
+# The relative length difference is about half of the other mode's energy fraction, which is thus 0.02 at the limit.
 _UNEVEN: Final = 0.009
 # _MOST_BEATING: if a larger fraction of the half cycles alternates, two modes beat [-].
 # _STRETCHED: smallest ratio of relative length difference to relative height difference in a beat [-]; preload: 0.3.
@@ -232,7 +232,7 @@ def _find_turns(energy: Samples) -> tuple[NDArray[np.intp], int]:
     """Return the indices of the energy extrema, and the last extremum that is completely visible."""
     turning_points = find_turns(energy)[0]
     last = energy.size - 2
-    # This many extrema can only be noise.
+    # So many extrema can only be caused by noise.
     if 4 * turning_points.size > energy.size:
         return np.zeros(0, dtype=np.intp), last
     turning_points = np.concatenate([[0], turning_points, [energy.size - 1]])
@@ -271,7 +271,7 @@ def _extend_lines(time: Samples, x: Samples, y: Samples) -> Samples:
 def _measure_off_line(x: Samples, y: Samples) -> Samples:
     """Return the distance of each of n >= 3 values from the line through its two nearest neighbours."""
     index = np.arange(x.size)
-    # Both neighbours of the first and of the last value are on the same side.
+    # Both neighbours of the first value, and of the last value, lie on the same side.
     middle = np.clip(index, 1, x.size - 2)
     is_end = index != middle
     near = np.where(is_end, middle, middle - 1)
@@ -350,5 +350,5 @@ def find_upper_envelope(time: Samples, energy: Samples) -> Envelope | None:
 def _is_left_turn(
     a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]
 ) -> bool:
-    """Return True if the path through three points bends to the left at the second point."""
+    """Return True if the path through three points turns left at the second point."""
     return (b[0] - a[0]) * (c[1] - a[1]) >= (b[1] - a[1]) * (c[0] - a[0])

@@ -41,14 +41,14 @@ loose: Any = d2  # for what a type checker would not let pass
 
 
 def assert_same_document(mine: Mapping[str, Any], theirs: Mapping[str, Any]) -> None:
-    """Compare two documents, except for the command that asked for them."""
+    """Compare two documents, except for the command that is stored in them."""
     assert {**mine, "command": None} == {**theirs, "command": None}
 
 
 def assert_frame_holds(
     frame: pd.DataFrame, rows: Sequence[Mapping[str, Any]], *, but: Collection[str] = ()
 ) -> None:
-    """Check that a frame has every value of the rows of a document bit for bit, NaN for null."""
+    """Check that a frame contains every value of a document's rows bit for bit, with NaN for null."""
     assert len(frame) == len(rows) > 0
     for shown_row, expected in zip(frame.to_dict("records"), rows, strict=True):
         for key in expected.keys() - {*but}:
@@ -61,7 +61,7 @@ def assert_frame_holds(
 
 @st.composite
 def records(draw: st.DrawFn) -> tuple[np.ndarray, np.ndarray]:
-    """Draw the energy of a damped oscillator after a load, with or without noise; d2rpick can describe only some."""
+    """Draw the energy of a damped oscillator after a load, with or without noise; not every record can be described."""
     states, periods = draw(st.integers(30, 200)), draw(st.floats(0.5, 12))
     noise, damping = draw(st.sampled_from([0.0, 0.0, 0.01, 0.5])), draw(st.floats(0, 3))
     time = np.linspace(0, 1, states)
@@ -147,7 +147,7 @@ def test_arguments_mean_what_options_mean(
             {"parts": 1, "weights": "site.toml"},
             ("--part", "1", "--weights", "site.toml"),
         ),
-        ({}, ()),  # the cost stays open
+        ({}, ()),  # the cost remains unknown
     ],
 )
 @pytest.mark.usefixtures("here")
@@ -187,7 +187,7 @@ def test_weights_in_memory_count_as_those_of_a_file() -> None:
     shares = [
         part_table.to_frame()["run_time_share"].min() for part_table in (cheap, dear)
     ]
-    assert shares[0] < shares[1]  # the other part keeps what it costs
+    assert shares[0] < shares[1]  # the other part keeps its cost
 
 
 @pytest.mark.slow
@@ -238,7 +238,7 @@ def test_the_command_of_an_answer_asks_the_same() -> None:
 
 @pytest.mark.slow
 def test_tables_lose_nothing_that_the_json_has(tmp_path: Path) -> None:
-    """Lists are not cells: the shares of a part in each flight and the details of a td have tables of their own."""
+    """Lists are not cells: the fractions of a part in each flight and the details of a td have their own tables."""
     run = d2.read(BOX)
     plan, parts = (
         d2.plan(run, parts="box", replay=False, min_quality="poor"),
@@ -363,7 +363,7 @@ def test_pictures_and_pages(tmp_path: Path) -> None:
     suggestion = d2.suggest(d2.read(ENERGY), float(TD))
     assert suggestion.plot().axes
     page = suggestion.report(tmp_path / "choice.html").read_text("utf-8")
-    assert '"command":["d2rpick suggest --td "' in page  # what can be explored
+    assert '"command":["d2rpick suggest --td "' in page  # data of the interactive part
     assert "d2rpick suggest --td 0.0687534" in page
     verdict = d2.verify(
         d2.read(ENERGY), tr=require(suggestion.recommended).tr, td=float(TD)

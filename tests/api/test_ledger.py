@@ -119,7 +119,7 @@ def test_what_could_not_be_read_is_asked_again(tmp_path: Path) -> None:
     Path(name).write_text("nothing of use\n")
     ledger.add(judge_run(QUESTION, name))
     ledger.add(study.make_failed_row(name, MemoryError()))
-    assert not Path(ledger.name).exists()  # the first row makes it
+    assert not Path(ledger.name).exists()  # the first row creates the file
     short = variants.write(tmp_path / "short.csv", end=0.05)
     ledger.add(judge_run(QUESTION, short))
     assert (

@@ -48,7 +48,7 @@ def test_weights_may_be_given_as_they_are(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_weights_in_memory_are_not_left_out_of_the_command_line() -> None:
-    """Without the weights, the printed command would give another run time; as printed, it is refused."""
+    """Without the weights, the printed command would give another run time; the command as printed is refused."""
     weights = Weights({"BT": 1.0, "QBAT": 1.0}, rigid_node=0.0)
     arguments: Any = {
         "parts": "recommended",

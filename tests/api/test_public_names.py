@@ -93,7 +93,7 @@ def test_other_names_are_not() -> None:
 
 
 def test_types_hold_for_a_stranger() -> None:
-    """mypy checks the types here with the knowledge of a user only."""
+    """mypy checks these types with only the knowledge of a user."""
     answer = d2.suggest(d2.read(ENERGY), td=0.0687534)
     assert_type(answer, d2.Suggestion)
     assert_type(answer.to_frame(), pd.DataFrame)

@@ -1,4 +1,4 @@
-"""One table of all arguments: it contradicts nothing, and is printed as a user types it."""
+"""One table of all arguments, which contains no contradictions and is printed as a user types it."""
 
 from typing import Any
 

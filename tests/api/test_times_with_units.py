@@ -135,7 +135,7 @@ PLATE = ROOT / "sample_data" / "falling_plate"
 
 
 def copy_plate(folder: Path, of_deck: str, of_run: str) -> str:
-    """Copy the deck of the falling plate, with these units of time in /BEGIN; without any for an empty text."""
+    """Copy the deck of the falling plate with these units of time in /BEGIN, or without units if the text is empty."""
     shutil.copytree(PLATE, folder)
     starter = folder / "plate_0000.rad"
     text = starter.read_text()

@@ -1,4 +1,4 @@
-"""A file is settled so long after its last change that no write is in progress and a later one would show."""
+"""A file is settled once its last change is so old that no write is in progress and a later write would show."""
 
 import os
 import stat

@@ -1,4 +1,4 @@
-"""Calls give the same results here, in processes and on a cluster; a process that dies stops nothing."""
+"""Calls give the same results in this process, in other processes and on a cluster; a dead process stops nothing."""
 
 import os
 import signal
@@ -124,6 +124,28 @@ def test_items_are_taken_as_there_is_room(farm: Callable[[], Farm]) -> None:
     with farm() as workers:
         for done, _ in enumerate(workers.answers(square, items())):
             assert taken <= done + getattr(workers, "room", 1)
+
+
+def test_an_interrupt_does_not_wait_for_a_lock_of_the_pool() -> None:
+    code = (
+        "import os\n"
+        "from d2rpick.base.workers import Cores\n"
+        "try:\n"
+        "    with Cores(2, 'tests.base.test_workers') as farm:\n"
+        "        farm._pool._shutdown_lock.acquire()\n"
+        "        raise KeyboardInterrupt\n"
+        "except KeyboardInterrupt:\n"
+        "    print('interrupted', flush=True)\n"
+        "    os._exit(0)\n"
+    )
+    with Popen(
+        [sys.executable, "-c", code], cwd=ROOT, stdout=PIPE, text=True
+    ) as process:
+        try:
+            output, _ = process.communicate(timeout=30)
+        finally:
+            process.kill()
+    assert output == "interrupted\n"
 
 
 def test_the_main_thread_holds_no_lock_of_the_pool(

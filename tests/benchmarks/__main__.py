@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 SUGGEST = ("suggest", "--td", "0.064", "sample_data/energy.csv")
 CHECK = ("check", "sample_data/switching.k")
 THREADS = "OPENBLAS_NUM_THREADS"
-# The command line sets one thread for itself; so do the measurements inside this process.
+# The command line sets one thread for itself, so the measurements in this process do the same.
 ONE_THREAD = {THREADS: "1"}
 _PROCESSES = 25
 _POINTS = 1_000_000
@@ -36,7 +36,7 @@ SEARCHES = (
     ("wide window", ("suggest", "--td-window", "0.3", "0.9"), 3.0),
     ("explore", ("explore", "--steps", "200"), 10.0),
 )
-# No flight is seen: each td looks at windows of its own, down to short ones.
+# No flight is visible, so each td looks at its own windows, down to short ones.
 UNSEEN = (
     *SEARCHES[1:2],
     ("explore", ("explore", "--td", "0.9", "--steps", "200"), 15.0),
@@ -159,7 +159,7 @@ class Row(NamedTuple):
     least: float | None = None
 
 
-# Ceilings of what somebody waits for at the screen, in processor seconds [s].
+# Largest processor times for which a user waits at the screen [s].
 WAITS = (
     *(
         Row(f"wait for {what}, three modes, {kind}, 1e5 [s]", measure, most)

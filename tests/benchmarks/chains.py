@@ -13,12 +13,12 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.history import Samples
 
-    # Of time, places and velocities of the masses, (n, 3, 2): forces of the same shape.
+    # A force of time, positions and velocities of the masses, each (n, 3, 2); the result has the same shape.
     Force = Callable[[float, Samples, Samples], Samples]
 
 
 class Chains(NamedTuple):
-    """n chains: masses (n, 3), springs and dampers between them (n, 2), and the yield forces of the springs (n, 2).
+    """Chains: masses (n, 3), springs and dampers between them (n, 2), and the yield forces of the springs (n, 2).
 
     Springs yield only up to a time (n,): the end of the load, or later.  ``places`` and ``velocities`` (n, 3, 2) are
     the initial ones.
@@ -124,7 +124,7 @@ def draw_directions(random: np.random.Generator, count: int) -> Samples:
 
 
 def apply_half_sine(time: float, start: Samples, length: Samples) -> Samples:
-    """Return a half-sine pulse of this length from ``start`` (n,) on, zero elsewhere."""
+    """Return a half-sine pulse of this length that begins at ``start`` (n,); it is zero elsewhere."""
     return np.asarray(np.sin(np.pi * np.clip((time - start) / length, 0, 1)))
 
 

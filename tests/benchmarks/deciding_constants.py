@@ -1,4 +1,4 @@
-"""Constants of `deciding_numbers`: where they are read, and how to scale one wherever a module holds it."""
+"""Constants of `deciding_numbers`: where they are used, and how to scale a constant wherever a module holds it."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from d2rpick.base.caching import cached_property
 PACKAGES: Final = ("vibration", "flight", "choice")
 
 Number = float | int | tuple[float, ...]
-# Name in a module, by the name of the module.
+# The name of a module, and a name in this module.
 Binding = tuple[str, str]
-# Name of a constant in a comment on several of them, which begins what concerns this constant.
+# Name of one of several constants that share a comment; it precedes the text about this constant.
 _LABEL: Final = re.compile(r"(?:^|(?<= ))(_?[A-Z][A-Z0-9_]+): ")
 
 
@@ -49,7 +49,7 @@ class Line(NamedTuple):
 
 
 class DefaultArgument(NamedTuple):
-    """Default of an argument, or of a field of a class, that a constant gives."""
+    """Default of an argument or of a class field that is given by a constant."""
 
     module: str
     owner: str
@@ -71,7 +71,7 @@ class Uses(NamedTuple):
 
 
 class Source:
-    """Syntax of a module, and what it reads by name."""
+    """Syntax of a module, and the names that it reads."""
 
     def __init__(self, module: ModuleType) -> None:
         self.module = module
@@ -81,7 +81,7 @@ class Source:
 
     @cached_property
     def imports(self) -> dict[str, Binding]:
-        """The source of each imported name, of imports inside functions too."""
+        """The source of each imported name, including imports inside functions."""
         return {
             alias.asname or alias.name: (node.module, alias.name)
             for node in ast.walk(self.tree)
@@ -107,7 +107,7 @@ class Source:
 
     @cached_property
     def reads_in_functions(self) -> dict[str, set[Line]]:
-        """The lines inside functions that read each name, by the name; attributes too."""
+        """The lines inside functions that read each name or attribute, keyed by the name."""
         reads: dict[str, set[Line]] = defaultdict(set)
         for function in ast.walk(self.tree):
             if isinstance(function, ast.FunctionDef):
@@ -185,7 +185,7 @@ class Source:
 
 
 def read_sources() -> dict[str, Source]:
-    """Import all modules, so that a child process finds nothing left to import, and read their syntax."""
+    """Import all modules, so that a child process imports nothing else, and read their syntax."""
     names = [
         module.name
         for module in pkgutil.walk_packages(d2rpick.__path__, "d2rpick.")
@@ -195,7 +195,7 @@ def read_sources() -> dict[str, Source]:
 
 
 def find_constants(sources: Mapping[str, Source]) -> list[Constant]:
-    """List the numeric constants at module level of `PACKAGES`; zeros, infinity and truth values are none."""
+    """List the numeric constants at module level of `PACKAGES`, except zeros, infinity and truth values."""
     constants = []
     for source in sources.values():
         module = source.module
@@ -303,7 +303,7 @@ def scale_constant(
     for (module_name, name), statement in uses.bindings[1:]:
         source = sources[module_name]
         if statement is not None:
-            # The value is computed from the constant: compute it again.
+            # The value is computed from the constant, so it is computed again.
             exec(
                 compile(ast.Module([statement], []), "again", "exec"),
                 vars(source.module),

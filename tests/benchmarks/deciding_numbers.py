@@ -5,11 +5,12 @@ that run a line with this constant are asked again, until a few answers have cha
 One question of each kind is asked before the next one of any kind.  Every trial is a fork of a process that has
 imported everything and asked nothing.
 
-The table docs/developing/deciding-numbers.csv shows how many answers changed, and the first change of each.  Its rows
+The table docs/developing/deciding-numbers.csv shows how many answers changed, and the first change of each. Its rows
 of deciding constants are kept; constants that have changed no answer so far, or have another value, are tried again,
-with other questions if ``--seed`` is another one.  A constant that changes no answer is a guard against round-off,
-overflow or damaged input, a limit of time or memory, a threshold of cases that the questions do not contain, or not
-needed.
+with other questions if ``--seed`` is another one. The table is written after each constant, so ``--resume`` continues
+a stopped run: it keeps all rows of constants that were tried. A constant that changes no answer is a guard against
+round-off, overflow or damaged input, a limit of time or memory, a threshold of cases that the questions do not
+contain, or not needed.
 """
 
 from __future__ import annotations
@@ -46,13 +47,13 @@ from tests.benchmarks.deciding_constants import (
 from tests.benchmarks.deciding_questions import Answer, Question, make_questions
 
 FACTORS: Final = {"halved": 0.5, "doubled": 2.0}
-# This number of changed answers shows that a constant decides; no further questions are asked.
+# After this number of changed answers, a constant is known to decide, and no further questions are asked.
 ENOUGH: Final = 3
-# A question takes at most this many times its usual duration, plus seconds; a scaled number of steps may take forever.
+# A question may take this multiple of its usual duration, plus these seconds; scaled step numbers may take forever.
 _PATIENCE, _LEAST_PATIENCE = 20.0, 5.0
-# Longest text of a value, or of a question, in the table.
+# Largest number of characters of a value or a question in the table.
 _TEXT = 24
-# End of the first sentence of a comment, which says what a constant decides; the others give its source or the reason.
+# End of the first sentence of a comment, which says what a constant decides; the others give the source or reason.
 _FIRST_SENTENCE: Final = re.compile(r"(?<=\.) (?=[A-Z_])")
 
 _HEAD: Final = (
@@ -67,7 +68,7 @@ _HEAD: Final = (
 
 
 class Baseline(NamedTuple):
-    """Unchanged answer to a question, its duration [s], and the lines with constants that it runs."""
+    """Unchanged answer to a question, its duration [s], and those lines with constants that it executes."""
 
     answer: Answer
     seconds: float
@@ -75,7 +76,7 @@ class Baseline(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """Number of questions asked with a scaled constant, and the changes of the answers by question."""
+    """Number of questions asked with a scaled constant, and the changed answers by question."""
 
     asked: int
     changes: dict[str, str]
@@ -97,11 +98,11 @@ class Row(NamedTuple):
 
 
 class OutOfTimeError(BaseException):
-    """A question takes far longer than usual."""
+    """Raised if a question takes far longer than usual."""
 
 
 class Trials:
-    """Questions and constants, and how to ask the questions with scaled constants."""
+    """Questions and constants, with methods that ask the questions with scaled constants."""
 
     def __init__(
         self,
@@ -132,7 +133,7 @@ class Trials:
         }
 
     def find_touched(self, name: str) -> list[str]:
-        """List the questions that run a line with a constant, the quickest of each kind first."""
+        """List the questions that execute a line with a constant, starting with the quickest of each kind."""
         lines = self.uses[name].lines
         touched = [
             question
@@ -171,7 +172,7 @@ class Trials:
 
 
 def ask_safely(question: Question, usual_seconds: float) -> Answer:
-    """Return the answer to a question, or the first words of what went wrong."""
+    """Return the answer to a question; if it fails, return the first words of the error."""
 
     def stop(*_: object) -> None:
         raise OutOfTimeError
@@ -191,7 +192,7 @@ def ask_safely(question: Question, usual_seconds: float) -> Answer:
 
 
 def measure_baseline(question: Question, lines: frozenset[Line]) -> Baseline:
-    """Ask a question once, and note which of these lines it runs."""
+    """Ask a question once, and record which of these lines it executes."""
     lines_by_file: dict[str, set[int]] = defaultdict(set)
     for line in lines:
         lines_by_file[line.file].add(line.number)
@@ -221,7 +222,7 @@ def measure_baseline(question: Question, lines: frozenset[Line]) -> Baseline:
 
 
 def describe_change(before: Answer, after: Answer, place: str = "") -> str:
-    """Return the first difference of two answers as ``place: before → after``; empty if there is none."""
+    """Return the first difference between two answers as ``place: before → after``; empty if they are equal."""
     if isinstance(before, dict) and isinstance(after, dict):
         for key in {**before, **after}:
             change = describe_change(
@@ -248,7 +249,7 @@ def describe_change(before: Answer, after: Answer, place: str = "") -> str:
 
 
 def call_in_child(function: Callable[[], Any]) -> Any:
-    """Call a function in a forked process, which leaves nothing behind in this one."""
+    """Call a function in a forked process, so that it changes nothing in this process."""
     context = multiprocessing.get_context("fork")
     receiver, sender = context.Pipe(duplex=False)
 
@@ -280,7 +281,7 @@ def make_row(constant: Constant, outcomes: Mapping[str, Outcome]) -> Row:
 
 
 def read_table(path: Path) -> dict[str, Row]:
-    """Return the rows of an earlier table by the names of their constants; empty without a table."""
+    """Return the rows of an earlier table by the names of their constants; empty if there is no table."""
     if not path.exists():
         return {}
     with path.open(encoding="utf-8", newline="") as file:
@@ -320,6 +321,11 @@ def main() -> None:
         default=3.0,
         help="questions that take longer are left out [s, with line tracing]",
     )
+    parser.add_argument(
+        "--resume",
+        action="store_true",
+        help="keep the rows of constants that changed nothing, too",
+    )
     parser.add_argument("names", nargs="*", help="parts of the names of constants")
     options = parser.parse_args()
     sources = read_sources()
@@ -330,9 +336,13 @@ def main() -> None:
         trials = Trials(sources, questions, options.longest)
         for name, constant in trials.constants.items():
             row = rows.get(name)
-            is_known = row and row.decides and row.value == f"{constant.value}"
+            is_done = (
+                row is not None
+                and row.value == f"{constant.value}"
+                and (options.resume or row.decides)
+            )
             is_named = not options.names or any(part in name for part in options.names)
-            if is_known or not is_named:
+            if is_done or not is_named:
                 continue
             outcomes = {
                 way: trials.try_factor(name, factor, options.seconds)

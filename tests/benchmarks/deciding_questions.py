@@ -1,4 +1,4 @@
-"""Questions of `deciding_numbers`: frozen answers, random records, and commands on the samples.
+"""Questions of `deciding_numbers`: frozen answers, random records, and commands for the sample files.
 
 Together they rest on energies, momenta, contact forces, health, parts, limits, finished switched runs and many runs.
 """
@@ -31,16 +31,16 @@ from tests.written_runs import FALL_WRITERS, as_matsum
 Answer = Any
 Question = Callable[[], Answer]
 
-# Decimals of a residual whose change is a change of the answer; times are compared to this number of digits.
+# Decimals to which residuals are compared, and digits to which times are compared.
 _DECIMALS, _DIGITS = 3, 5
-# Significant digits and decimals to which the numbers of a JSON document are compared.
+# Significant digits and decimals to which numbers in a JSON document are compared.
 _JSON_DIGITS, _JSON_DECIMALS = 4, 6
 # Keys of a JSON document that repeat the question or the program.
 _REPEATED: Final = {"command", "version", "settings", "arguments", "seconds"}
 # States of a fall.
 _STATES = 300
 
-# Command lines on the sample data; {data} is the folder of computed runs of the tests.
+# Command lines for the sample data; {data} is the folder of the computed runs of the tests.
 _COMMANDS: Final = """
 info sample_data/rollover_box.matsum
 info sample_data/rolloverT01.gz
@@ -131,7 +131,7 @@ def _make_energy_questions(
 
 
 def _make_fall_questions(records: int, seed: int, folder: Path) -> dict[str, Question]:
-    """Make a plan for each fall, written with momenta in the formats of `falls` and as matsum."""
+    """Make a plan for each fall, written with momenta in the formats of `falls` and as a matsum."""
     questions: dict[str, Question] = {}
     random = np.random.default_rng([seed, 48])
     writers = FALL_WRITERS | {"matsum": lambda fall, place, **_: as_matsum(fall, place)}
@@ -239,7 +239,7 @@ def _answer_command(command: str) -> Answer:
 
 
 def _round_document(value: object) -> object:
-    """Return a JSON value with rounded numbers; numbers in sentences are left out."""
+    """Return a JSON value with rounded numbers, and without the numbers in sentences."""
     if isinstance(value, dict):
         return {
             key: _round_document(inner)

@@ -63,7 +63,7 @@ def find_cards(path: Path) -> None:
 
 
 def number_cards(path: Path) -> None:
-    """Find the cards and count the lines to each."""
+    """Find the cards, and determine the line number of each."""
     assert [card.line for card in read_deck(str(path)).cards][-1] == 2 * NODES + 22
 
 
@@ -141,7 +141,7 @@ def check_to_dynars() -> float | None:
     with write_large_deck() as path:
         return measure_ratio(
             lambda: check(path), lambda: parse(path), 5 * _ROUNDS
-        )  # of milliseconds only
+        )  # the times are only milliseconds
 
 
 def many_to_parse() -> float:

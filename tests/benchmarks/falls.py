@@ -60,7 +60,7 @@ def integrate_falls(
     )
     starts = (
         np.round(starts * states / length) / states * length
-    )  # a load ends at a state: none is half in it
+    )  # a load ends at a state, because no state may contain half of it
     yields_until = np.where(random.random(count) < 0.5, starts, ends)
     still = np.zeros((count, 3, 2))
     heavy = masses[..., np.newaxis] * np.array([0.0, -GRAVITY])

@@ -1,4 +1,4 @@
-"""Flights claimed and missed under random loads, against the force that truly acts.
+"""Flights claimed and missed under random loads, compared with the force that truly acts.
 
 ``python -m tests.benchmarks.flights [RECORDS [SEED]]``: chains of three masses and two springs fly in a plane, half of
 them under gravity, while a random load acts on the first mass.  Each record is written with seven digits, as momenta of
@@ -26,11 +26,11 @@ if TYPE_CHECKING:
 
     Force = Callable[
         [float, Samples, Samples], Samples
-    ]  # of time, place and speed of the first masses, (n, 2)
+    ]  # a function of time, positions and velocities of the first masses, (n, 2)
 
 STATES, STEPS, DIGITS, GRAVITY = 1000, 8, 7, 9.81
-# It flies where the force, without gravity, is below this share of its peak.  A claim is wrong where more than this
-# share of the largest momentum still changes.  Only flights that last for a tenth of the record can be missed.
+# The chain flies if the force without gravity is below this fraction of its peak. A claim is wrong if more than this
+# fraction of the largest momentum still changes. A missed flight lasts for at least 10 % of the record.
 LITTLE, LONG = 0.01, 0.1
 FORMS: Final = ("parts", "momenta", "totals")
 PARTS: Final = tuple(Part(number, f"mass {number}") for number in (1, 2, 3))
@@ -39,7 +39,7 @@ TIME: Final = np.linspace(0, 1, STATES + 1)
 
 
 class Flown(NamedTuple):
-    """One record: (states,), momenta (states, 3, 2), energies, and the ``force`` beside gravity, (states, 2)."""
+    """One record: times (states,), momenta (states, 3, 2), energies, and the ``force`` except gravity, (states, 2)."""
 
     momentum: Samples
     kinetic: Samples
@@ -150,7 +150,7 @@ def wall(random: np.random.Generator, count: int) -> Force:
 
 
 def friction(random: np.random.Generator, count: int) -> Force:
-    """Draw friction of the ground that carries the chain, until it stands still."""
+    """Draw friction of the ground that carries the chain until the chain stands still."""
     pull = random.uniform(10, 3000, (count, 1))
     return lambda _, __, velocity: np.asarray(-pull * np.tanh(velocity / 0.01))
 
@@ -203,7 +203,7 @@ def make_history(run: Flown, form: str) -> History:
 
 
 def count_flights(run: Flown, form: str) -> Counter[str]:
-    """Count claimed flights not graded poor, wrong ones among them, true flights, and missed ones."""
+    """Count claimed flights not graded poor, wrong ones among these, true flights, and missed flights."""
     claimed_flights = find_flights(make_history(run, form), Settings(replay=False))
     claims = [
         (f.start or 0.0, TIME[-1] if f.end is None else f.end) for f in claimed_flights

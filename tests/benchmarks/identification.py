@@ -1,4 +1,4 @@
-"""Cost of an identification over one scipy least_squares fit started at the truth, and the accuracy of residuals.
+"""Cost of an identification over a scipy least_squares fit that starts at the truth, and the accuracy of residuals.
 
 The accuracy is measured on random records: 3 to 12 periods of a mode, 15 to 200 states per period, noise up to 3 %, and
 no other mode, one with 0.3 to 3 % of the energy, or one with 3 to 30 %.
@@ -35,14 +35,14 @@ if TYPE_CHECKING:
 
 _TRUTH = np.array([MODE.omega, MODE.alpha, MODE.cosine, MODE.sine])
 _ROUNDS = 51
-# Share of the energy in the second mode, from the first times ten to the power of 0 to 1.
+# Energy fraction of the second mode, from the first value times ten to the power of 0 to 1.
 _SHARES = {"one": 0.0, "small": 0.003, "large": 0.03}
-# Periods: a crossing as near to a true one is meant to be it.
+# A crossing this close to a true crossing [periods] is treated as that crossing.
 _NEAR = 1 / 8
 
 
 def to_scipy() -> float:
-    """Return the time of one identification over that of one such fit: medians of interleaved runs, 6 digits."""
+    """Return the time of an identification over that of a scipy fit, as medians of interleaved runs, for 6 digits."""
     energy = round_as_printed(ENERGY)
 
     def residuals(parameters: Samples) -> Samples:
@@ -91,7 +91,7 @@ def small_second_modes(kind: str, seeds: Iterable[int]) -> list[Stated]:
 
 
 def summarize_records(records: list[Stated]) -> tuple[float, float, float]:
-    """Return 95th percentiles of the errors of residuals and of their ranges, and the share of right intervals."""
+    """Return 95th percentiles of the errors of residuals and of their ranges, and the fraction of right intervals."""
     deviations = [abs(record.stated - record.true) for record in records]
     beyond = [
         max(record.stated - record.true, record.true - record.highest, 0.0)

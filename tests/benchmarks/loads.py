@@ -1,4 +1,4 @@
-"""Pairs graded good or fair under loads that last, compared with the momentum that the loads really change.
+"""Pairs graded good or fair under lasting loads, compared with the momentum that the loads really change.
 
 ``python -m tests.benchmarks.loads [RECORDS [SEED]]``: chains of three masses and two springs move in a plane and
 vibrate under a load of one kind.  Each run is written as four files with the digits of their formats: totals in a
@@ -38,16 +38,16 @@ if TYPE_CHECKING:
     Motion = Callable[[float, Samples, Samples, Samples], Samples]
 
 STATES, STEPS = 500, 16
-# Of the third mass of a chain of two.
+# Stiffness of a second spring and mass of a third mass in a chain of two.
 _NO_MASS: Final = 1e-6
-# A pair is wrong in which more than this share of the largest momentum changes.
+# A pair is wrong if more than this fraction of the largest momentum changes.
 WRONG: Final = 0.01
-# A flight in which less of the momentum changes, for this share of the record, is missed where none is shown.
+# A flight is missed if less of the momentum changes for this fraction of the record, but no flight is shown.
 STEADY, LONG = 0.001, 0.15
-# td that are asked for beside the one that is chosen, as shares of the record.
+# Given values of td in addition to the chosen one, as fractions of the record.
 ASKED: Final = (0.4, 0.85)
 GRAVITY: Final = 9.81
-# Of the Moon, Mars, Venus, Jupiter, and of a centrifuge.
+# Gravity of the Moon, Mars, Venus and Jupiter, and of a centrifuge.
 OTHER_GRAVITIES: Final = (1.62, 3.71, 8.87, 24.8, 49.05)
 
 
@@ -257,7 +257,7 @@ def count_pairs(reference: Reference, run: Run) -> Counter[str]:
 def _find_true_flights(
     impulse: Samples, time: Samples, room: float
 ) -> Iterator[tuple[float, float]]:
-    """Yield the longest stretches in which an impulse changes by at most ``room``, one after the other."""
+    """Yield, one after the other, the longest periods in which an impulse changes by at most ``room``."""
     first = 0
     while first < time.size - 1:
         last = first

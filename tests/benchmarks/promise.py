@@ -1,4 +1,4 @@
-"""What a recommended pair, its stated residual and its grade are worth: ``python -m tests.benchmarks.promise --help``.
+"""How good recommended pairs are, compared with their stated residuals and grades: ``tests.benchmarks.promise``.
 
 A structure is loaded and then flies.  Its record is written to a file, and ``suggest`` recommends a pair.  The true
 residual R comes from the motion: in closed form for linear structures, otherwise from integrating two runs from td on.
@@ -26,17 +26,17 @@ from tests.benchmarks.promise_records import INTEGRATED, Make, Record
 
 CLASSES: Final[dict[str, Make]] = INTEGRATED | LINEAR
 
-# A stated residual holds if the true one is so near to it, or to its band.
+# A stated residual is right if the true residual is this close to it, or lies in its band.
 WITHIN: Final = 0.05
-# True residuals: of a pair that deserves to be called good; of one that does not; of a switch that keeps nothing.
+# True residuals of a pair that deserves the grade good, of one that does not, and of a release without vibration.
 DESERVES_GOOD, BAD, KEEPS_NOTHING = 0.2, 0.3, 1.0
-# A pair that states less promises that it is not `BAD`.
+# A pair with a smaller stated residual promises not to be `BAD`.
 PROMISES: Final = 0.25
-# The oracle, free to choose td, keeps the parts rigid for this share of the recommended time, or of the flight.
+# Rigid time of the oracle, which chooses td freely, as a fraction of the recommended time, or of the flight.
 _SHARE_OF_RIGID, _SHARE_OF_FLIGHT = 0.5, 0.25
-# A tr is in the load if it lies before the flight by more than this share of it.
+# A tr lies in the load if it precedes the flight by more than this fraction of the flight.
 _EARLY: Final = 0.01
-# Rounding of times in the file, and the search of the oracle.
+# Rounding errors of times in the file, and in the search of the oracle.
 _ROUNDING: Final = 1e-3
 
 _NUMBERS: Final = (
@@ -68,7 +68,7 @@ class Pair(NamedTuple):
 
     @property
     def kept(self) -> bool | None:
-        """True if the residual is as stated; None if none was stated."""
+        """True if the true residual agrees with the stated one; None if none was stated."""
         if self.low is None or self.high is None:
             return None
         return self.low - WITHIN <= self.true <= self.high + WITHIN
@@ -146,7 +146,7 @@ def ask_for_pair(record: Record, folder: Path) -> Pair | None:
 
 
 def try_record(record: Record, folder: Path) -> Trial:
-    """Ask for a pair of a record, and ask the oracle."""
+    """Determine the recommended pair of a record, and the pair of the oracle."""
     td_asked = record.suggest.get("td")
     pair, error = None, ""
     start = time.perf_counter()
@@ -207,7 +207,7 @@ def _compute_share(hits: pd.Series[bool]) -> str:
 
 
 def _compare(pairs: pd.DataFrame) -> str:
-    """Return the median of the true residuals, that of the oracle in brackets, and the number of pairs."""
+    """Return the median of the true residuals (in brackets, that of the oracle), and the number of pairs."""
     if pairs.empty:
         return "-"
     return (
@@ -284,7 +284,7 @@ def run_benchmark(
             flush=True,
         )
         tables.append(tabulate(name, trials).assign(seed=options.seed))
-        if options.csv:  # after each class, since all take an hour
+        if options.csv:  # after each class, because all classes take an hour
             pd.concat(tables, ignore_index=True).to_csv(options.csv, index=False)
     if tables:
         print_tables(pd.concat(tables, ignore_index=True))

@@ -21,14 +21,14 @@ from tests.benchmarks.promise_records import (
 )
 from tests.benchmarks.promise_truth import Truth
 
-# A longer record would only take longer.
+# A longer record would only take more time.
 _MOST_STATES: Final = 4000
 _FEWEST_PER_PERIOD: Final = 6.0
 PART_COLUMNS: Final = ("frame_internal_energy", "cabin_internal_energy")
 
 
 class Shapes(NamedTuple):
-    """What vibrates: ``ratios`` (k,), frequencies of the modes over a first one.
+    """Vibrating structure: ``ratios`` (k,) are the frequencies of its modes relative to a first frequency.
 
     ``local`` (k, k) maps loads on places to loads on the modes, and ``loaded`` (k,) says which places have any.
     """
@@ -40,7 +40,7 @@ class Shapes(NamedTuple):
 
 
 class Surroundings(NamedTuple):
-    """What else is known of a record while its stretch is drawn: times, and the swing of each mode, shape (k,)."""
+    """Properties of a record needed to draw its slow deformation: times, and the amplitude of each mode, shape (k,)."""
 
     period: float
     loaded_until: float
@@ -100,7 +100,7 @@ def make_linear(
     work = draw_log(random, 0.1, 50.0) * swing if plastic else 0.0
     worked = work * np.clip(time / flight_start, 0, 1) ** 2
     scatter = noise * swing * random.standard_normal(elastic.shape)
-    # The parts share the work, and the noise of their sum is that of one record.
+    # The noise is divided among the parts, so that the noise of their sum is that of one record.
     energies = (
         elastic + worked[:, np.newaxis] / part_count + scatter / np.sqrt(part_count)
     )
@@ -121,7 +121,7 @@ def make_linear(
 
 
 def _add_impulses(loads: Sequence[Load], time: Samples) -> Samples:
-    """Return what the loads have given until the times, shape (n,); a short kick may lie between two of them."""
+    """Return the integral of the loads up to the times, shape (n,); a short kick may lie between two of them."""
     return np.asarray(
         sum(np.abs(load.heights).max() * load.integrate(time) for load in loads)
     )
@@ -130,7 +130,7 @@ def _add_impulses(loads: Sequence[Load], time: Samples) -> Samples:
 def _draw_loads(
     random: np.random.Generator, shape: Shapes, period: float, *, fading: bool
 ) -> list[Load]:
-    """Draw up to three pushes, and a kick behind them in most records, or a load that fades."""
+    """Draw up to three pushes, in most records followed by a kick, or a load that fades."""
     scale = shape.loaded * np.exp(random.uniform(np.log(0.2), 0.0, shape.ratios.size))
 
     def draw_heights() -> Samples:
@@ -143,7 +143,7 @@ def _draw_loads(
         start += random.uniform(0, 1.0) * period
         height = (
             0.4 if kicked else 1.0
-        )  # slow modes are not to drown what a kick leaves of the fast ones
+        )  # slow modes must not hide the effect of a kick on the fast modes
         loads.append(
             Load(start, draw_log(random, 0.1, 1.5) * period, height * draw_heights())
         )
@@ -163,7 +163,7 @@ def _draw_loads(
         duration = random.uniform(0.2, 0.8) * fastest_period
         impulse = 1 / (
             4 * shape.ratios * duration / period
-        )  # a short push: speed over undamped frequency
+        )  # duration of a short push: velocity over undamped frequency
         loads.append(Load(take_off, duration, impulse * draw_heights()))
     return loads
 
@@ -176,7 +176,7 @@ def _draw_times(
     irregular: bool,
     coarse: bool,
 ) -> Samples:
-    """Draw the times of states, some in each period of the fastest line of the energy."""
+    """Draw the times of states, with some states in each period of the fastest line of the energy."""
     density = draw_log(random, 2.2, 8.0) if coarse else draw_log(random, 10.0, 50.0)
     most_shared = max(_MOST_STATES * fastest_period / end, _FEWEST_PER_PERIOD)
     step = fastest_period / min(density, most_shared)
@@ -186,18 +186,18 @@ def _draw_times(
     if random.random() < 0.5:
         restart = random.integers(
             0, int(end / step)
-        )  # a restart with another interval of output
+        )  # a restart with another output interval
         steps[restart:] *= random.choice([0.5, 2.0])
     time = np.cumsum(steps)
     return np.asarray(np.append(0.0, time[time < end]))
 
 
 def _scale(parts: Parts | None, period: float) -> Parts | None:
-    """Give the velocities of parts, drawn for a first frequency of 1, their unit."""
+    """Draw the velocities of parts for a first frequency of 1 in their unit."""
     return parts and parts._replace(masses=parts.masses * period / (2 * np.pi))
 
 
-# Damping ratios of modes whose frequencies over the first are given, of shape (k,).
+# Functions that return damping ratios of modes, shape (k,), given their frequencies relative to the first.
 
 
 def damp_by_mass(random: np.random.Generator, ratios: Samples) -> Samples:
@@ -206,12 +206,12 @@ def damp_by_mass(random: np.random.Generator, ratios: Samples) -> Samples:
 
 
 def damp_by_stiffness(random: np.random.Generator, ratios: Samples) -> Samples:
-    """Damp fast modes more."""
+    """Damp fast modes more than slow ones."""
     return np.minimum(draw_log(random, 1e-3, 0.02) * ratios, 0.3)
 
 
 def damp_each(random: np.random.Generator, ratios: Samples) -> Samples:
-    """Damp each mode in a way of its own."""
+    """Damp each mode individually."""
     return np.asarray(np.exp(random.uniform(np.log(5e-4), np.log(0.05), ratios.size)))
 
 
@@ -221,7 +221,7 @@ def damp_each(random: np.random.Generator, ratios: Samples) -> Samples:
 def draw_modes(
     random: np.random.Generator, fewest: int, most_modes: int, highest: float
 ) -> Shapes:
-    """Draw so many modes, between a first frequency and the ``highest``."""
+    """Draw this number of modes, between a first frequency and the ``highest``."""
     gaps = random.uniform(0.3, 1.7, int(random.integers(fewest, most_modes + 1)) - 1)
     return _keep_apart(
         np.append(1.0, 1 + (highest - 1) * np.cumsum(gaps) / gaps.sum())
@@ -231,7 +231,7 @@ def draw_modes(
 
 
 def draw_close(random: np.random.Generator) -> Shapes:
-    """Draw one or two pairs of modes whose frequencies differ by 0.3 to 6 %, and perhaps another mode."""
+    """Draw one or two pairs of modes whose frequencies differ by 0.3 to 6 %, possibly with another mode."""
     first = np.array([1.0, random.uniform(1.3, 3.5)])[: random.integers(1, 3)]
     second = first * (
         1 + np.exp(random.uniform(np.log(0.003), np.log(0.06), first.size))
@@ -241,7 +241,7 @@ def draw_close(random: np.random.Generator) -> Shapes:
 
 
 def draw_harmonic(random: np.random.Generator) -> Shapes:
-    """Draw modes at two or three times a first frequency, or both, exactly or nearly, and perhaps another mode."""
+    """Draw modes at two or three times a first frequency, exactly or nearly, possibly with another mode."""
     multiples = [(2.0,), (3.0,), (2.0, 3.0)][random.integers(0, 3)]
     frequency_error = random.choice([0.0, 1e-3]) * random.normal(size=len(multiples))
     second_rate = random.uniform(1.2, 3.5, random.integers(0, 2))
@@ -257,7 +257,7 @@ def _keep_apart(ratios: Samples) -> Shapes:
 
 
 def draw_exchange(random: np.random.Generator) -> Shapes:
-    """Draw two parts with energies of their own, which a weak spring couples at nearly equal frequencies."""
+    """Draw two parts with their own energies, whose nearly equal frequencies a weak spring couples."""
     frame = np.append(1.0, random.uniform(1.3, 3.0, random.integers(0, 2)))
     cabin = np.append(
         1 + random.uniform(-0.05, 0.05), random.uniform(1.3, 3.0, random.integers(0, 2))
@@ -298,7 +298,7 @@ def _couple(
     owners: NDArray[np.int_],
     is_recorded: NDArray[np.bool_],
 ) -> Shapes:
-    """Join unit masses, on springs of their own with these frequencies, by springs: two places and a stiffness.
+    """Connect unit masses, each on its own spring with one of these frequencies, by springs (two places, stiffness).
 
     ``owners`` are the parts of the recorded springs: those of recorded masses, then, if all are, those between them.
     """
@@ -312,7 +312,7 @@ def _couple(
     unit = frequencies[0]
     in_modes = (
         vectors / frequencies
-    )  # of the masses, so that the elastic energy is the sum of q^2
+    )  # springs of the masses, so that the elastic energy is the sum of q^2
     recorded = (
         stretches if is_recorded.all() else stretches[: positions.size][is_recorded]
     )
@@ -326,7 +326,7 @@ def _couple(
 
 
 def draw_spin(random: np.random.Generator, around: Surroundings) -> Stretch:
-    """Draw the stretch of a body that spins up under its load, of 0.05 to 3 swings of a mode."""
+    """Draw the deformation of a body that spins up under its load, equal to 0.05 to 3 amplitudes of a mode."""
     until = around.loaded_until
 
     def course(time: Samples) -> Samples:
@@ -348,7 +348,7 @@ def draw_spin(random: np.random.Generator, around: Surroundings) -> Stretch:
 
 
 def draw_hinge(random: np.random.Generator, around: Surroundings) -> Stretch:
-    """Draw the pull of a part that swings like a pendulum on its hinge, slower than the modes by 3 to 20 times.
+    """Draw the pull of a part that swings on its hinge like a pendulum, 3 to 20 times more slowly than the modes.
 
     Its angle has sin(angle / 2) = depth sn(slow t), and it pulls with cos(angle) and the square of its speed.
     """

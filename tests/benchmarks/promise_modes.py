@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 class Load(NamedTuple):
-    """A force on the modes, as the deformation ``heights`` (k,) that its peak would hold.
+    """A force on the modes; ``heights`` (k,) is the deformation that its peak would cause statically.
 
     A push is a half-sine of the ``duration``; a load that ``fades`` has always been there, and is gone by then.
     """
@@ -31,7 +31,7 @@ class Load(NamedTuple):
         return self.start + self.duration
 
     def evaluate(self, time: Samples) -> Samples:
-        """Return the course of the force, 1 at its peak, shape (n,)."""
+        """Return the time history of the force with a peak of 1, shape (n,)."""
         phase = np.pi * np.clip((time - self.start) / self.duration, 0.0, 1.0)
         return (1 + np.cos(phase)) / 2 if self.fades else np.sin(phase)
 
@@ -46,7 +46,7 @@ class Load(NamedTuple):
 
 
 class Stretch(NamedTuple):
-    """A slow deformation about which the modes vibrate: ``courses`` maps times (n,) to shape (n,), and its rate."""
+    """A slow deformation about which the modes vibrate: ``courses`` maps times (n,) to shape (n,); and its rate."""
 
     heights: Samples
     course: Callable[[Samples], Samples]
@@ -54,7 +54,7 @@ class Stretch(NamedTuple):
 
 
 class Parts(NamedTuple):
-    """What the energies of the recorded springs and masses are in the modes.
+    """Relation between the energies of the recorded springs and masses and the modes.
 
     Spring i holds ``(springs[i] @ q)**2`` and mass j moves with ``(masses[j] @ q')**2``; ``owners`` numbers the part of
     each spring.
@@ -76,7 +76,7 @@ class Modes(NamedTuple):
 
     @property
     def most_times(self) -> int:
-        """Number of times that a search can afford."""
+        """Largest number of times for which a search is fast enough."""
         return 900
 
     @property
@@ -91,7 +91,7 @@ class Modes(NamedTuple):
 
     @property
     def undamped(self) -> Samples:
-        """Angular frequency of each mode without its damping, shape (k,) [1/time]."""
+        """Undamped angular frequency of each mode, shape (k,) [1/time]."""
         return np.hypot(self.rate, self.decay)
 
     def follow(self, time: Samples) -> tuple[Samples, Samples]:
@@ -106,7 +106,7 @@ class Modes(NamedTuple):
         return np.hstack([deformation, np.zeros_like(velocity)])
 
     def compute_states(self, time: Samples) -> tuple[Samples, Samples]:
-        """Return q and q' with the slow stretch, each of shape (n, k)."""
+        """Return q and q' including the slow deformation, each of shape (n, k)."""
         deformation, velocity = self._compute_vibration(time)
         if self.stretch is None:
             return deformation, velocity
@@ -131,18 +131,18 @@ class Modes(NamedTuple):
     def _project(
         self, deformation: Samples, velocity: Samples
     ) -> tuple[Samples, Samples]:
-        """Return the roots of the recorded energies, each of shape (n, d/2)."""
+        """Return the square roots of the recorded energies, each of shape (n, d/2)."""
         if self.parts is None:
             return deformation, velocity / self.undamped
         return deformation @ self.parts.springs.T, velocity @ self.parts.masses.T
 
     def _compute_vibration(self, time: Samples) -> tuple[Samples, Samples]:
-        """Add what the loads have left, by superposition: q and q', each of shape (n, k)."""
+        """Add the response to the loads by superposition: q and q', each of shape (n, k)."""
         deformation = np.zeros((time.size, self.rate.size))
         velocity = np.zeros_like(deformation)
         for load in self.loads:
             wave = np.pi / load.duration
-            # A half-sine is a sine that sets in and, half a period later, another that cancels it.
+            # A half-sine is the sum of a sine that begins and of an equal sine that begins half a period later.
             begun, begun_rate = self._respond(time - load.start, wave)
             ended, ended_rate = self._respond(time - load.end, wave)
             if load.fades:
@@ -157,7 +157,7 @@ class Modes(NamedTuple):
         return deformation, velocity
 
     def _respond(self, since: Samples, wave: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return the deformation under a unit force exp(i wave t) that sets in at 0, and its rate, complex (n, k)."""
+        """Return the deformation under a unit force exp(i wave t) that begins at 0, and its rate, complex (n, k)."""
         pole = -self.decay + 1j * self.rate
         square = self.undamped**2
         forced = square / (square - wave**2 + 2j * wave * self.decay)

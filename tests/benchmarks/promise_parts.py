@@ -1,4 +1,4 @@
-"""What a good grade of parts is worth: random records, seeded, compared with the exact motion of their modes.
+"""How reliable a good grade of several parts is: random records compared with the exact motion of their modes.
 
 python -m tests.benchmarks.promise_parts [N [SEED]]
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 class Motion(NamedTuple):
-    """Vibration of m modes, ``exp(-alpha t/2) cos(rate t + phase)``; a part has the energy ``x' form x``.
+    """Vibration of m modes, ``exp(-alpha t/2) cos(rate t + phase)``. The energy of a part is ``x' form x``.
 
     ``rate`` and ``phase`` have shape (m,); ``forms`` (k, m, m) are the stiffnesses of k parts in the modes.
     """
@@ -120,7 +120,7 @@ def draw_mixed_modes(rng: np.random.Generator) -> Motion:
 
 
 def draw_two_planes(rng: np.random.Generator) -> Motion:
-    """Draw a part whose second plane holds 0.3 to 50 % of its energy, next to a part with one mode or two planes."""
+    """Draw a part whose second plane has 0.3 to 50 % of its energy, next to a part with one mode or two planes."""
     modes = [
         (0, 1 - (share := 10 ** rng.uniform(-2.5, -0.3))),
         (0, share),
@@ -135,7 +135,7 @@ def draw_two_planes(rng: np.random.Generator) -> Motion:
 
 
 def _draw_planes(rng: np.random.Generator, modes: list[tuple[int, float]]) -> Motion:
-    """Draw modes with an energy and the number of the part they belong to."""
+    """Draw modes, each with an energy and the number of the part to which it belongs."""
     part, energy = (np.array(column) for column in zip(*modes, strict=True))
     rate = 2 * np.pi * rng.uniform(1, 3.5, len(modes))
     forms = np.array(

@@ -1,4 +1,4 @@
-"""Random records of structures that were integrated: modes whose springs may stiffen, plastic work, heat, drift.
+"""Random records of structures that were integrated: modes with stiffening springs, plastic work, heat, or drift.
 
 Each is a file, questions to ask, and the truth about every pair.  A further class is a line in `INTEGRATED`.
 """
@@ -18,7 +18,7 @@ MASS, GRAVITY = 1000.0, 9.81
 
 
 class Record(NamedTuple):
-    """Columns of a file, written with so many ``digits``, and the truth about its pairs.
+    """Columns of a file that are written with this number of ``digits``, and the truth about its pairs.
 
     ``read`` and ``suggest`` are arguments of the functions of this name.
     """
@@ -123,7 +123,7 @@ def make_integrated(
 def ask_for_times(
     random: np.random.Generator, begin: float, end: float
 ) -> dict[str, object]:
-    """Ask for both times, or for a td in the flight."""
+    """Request both times, or the best tr for a td in the flight."""
     return (
         {}
         if random.random() < 2 / 3
@@ -138,7 +138,7 @@ def add_evidence(
     kinetic: Samples,
     units: tuple[float, float] = (1.0, 1.0),
 ) -> dict[str, Samples]:
-    """Give nothing, momenta that do not fall, or falling ones with the kinetic energy of the whole.
+    """Draw no momenta, momenta that do not fall, or falling momenta with the kinetic energy of the whole model.
 
     ``impulse`` that the loads have given so far, in any unit, and ``kinetic``, the energy of the vibration: shape (n,).
     """
@@ -149,7 +149,7 @@ def add_evidence(
     speed[:, 0] += random.uniform(1, 5) * impulse / max(impulse[-1], 1e-300)
     speed[:, 2] -= GRAVITY * time * (kind == 3)
     by_time, by_energy = units
-    unit = by_energy * by_time  # of a momentum whose unit of length is the metre
+    unit = by_energy * by_time  # for a momentum in metres
     momenta = {
         f"{axis}_momentum": MASS * speed[:, axis_index] * unit
         for axis_index, axis in enumerate("xyz")
@@ -178,7 +178,7 @@ def make_stiffening(random: np.random.Generator) -> Record:
 
 
 def make_drifting(random: np.random.Generator) -> Record:
-    """Make an energy that drifts in flight, or keeps what damping takes of the vibration."""
+    """Make an energy that drifts in flight, or that contains what damping takes from the vibration."""
     which = random.integers(1, 4)
     return make_integrated(
         random,
@@ -209,7 +209,7 @@ def make_coarse(random: np.random.Generator) -> Record:
 
 
 def make_rubbing(random: np.random.Generator) -> Record:
-    """Make modes that dry friction slows, whose heat the energy does not hold: 1 to 20 % of the swing each period."""
+    """Make modes that dry friction slows by 1 to 20 % of the amplitude per period; the heat is not in the energy."""
     return make_integrated(
         random, modes=int(random.integers(1, 4)), join=_choose_friction
     )
@@ -225,7 +225,7 @@ def _choose_friction(
 
 
 def make_rattling(random: np.random.Generator) -> Record:
-    """Make masses that hit one another across a gap, which 20 to 90 % of their swing closes."""
+    """Make masses that hit each other across a gap, which 20 to 90 % of their amplitude closes."""
     return make_integrated(random, modes=int(random.integers(2, 4)), join=_choose_gap)
 
 
@@ -241,7 +241,7 @@ def _choose_gap(
 
 
 def _draw_row(random: np.random.Generator, structure: Structure) -> Samples:
-    """Draw how far each mode moves the two sides of a joint against each other, of length 1."""
+    """Draw, with a length of 1, how far each mode moves the two sides of a joint relative to each other."""
     row = random.normal(size=structure.omega.size)
     return np.asarray(row / np.linalg.norm(row))
 

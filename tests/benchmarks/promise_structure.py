@@ -1,4 +1,4 @@
-"""Structures that are not linear, whose motion scipy integrates: springs that stiffen, gaps that close, friction."""
+"""Nonlinear structures whose motion scipy integrates: stiffening springs, closing gaps, friction."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.history import Samples
 
-# Periods of the slowest mode after td over which two runs are compared, and the number of times there.
+# Periods of the slowest mode after td over which two runs are compared, and the number of compared times.
 COMPARED: Final = 2.0
 _COMPARED_AT: Final = 200
 _EXACT: Final[dict[str, Any]] = {"method": "DOP853", "rtol": 1e-7, "atol": 1e-10}
-# A joint has kinks, at which a high order is of no use.
+# A joint has kinks, for which a method of high order has no advantage.
 _EXACT_WITH_KINKS: Final[dict[str, Any]] = {
     "method": "RK45",
     "rtol": 1e-6,
     "atol": 1e-9,
 }
-# For the search among hundreds of runs that are integrated at once: R within 0.001, with contacts within 0.01.
+# Accuracy for the search among hundreds of runs integrated at once: R within 0.001, with contacts within 0.01.
 _MANY: Final[dict[str, Any]] = {"method": "RK45", "rtol": 1e-4, "atol": 1e-6}
 
 
@@ -44,7 +44,7 @@ class Joint(NamedTuple):
     recorded: bool = True
 
     def compute_force(self, q: Samples, speed: Samples) -> Samples:
-        """Return the force on each mode, of the shape of q, (k, n)."""
+        """Return the force on each mode, in the shape of q, (k, n)."""
         contact = self.stiffness * self._compress(q)
         rubbing = self.friction * np.tanh(self.row @ speed / self.creep)
         return np.multiply.outer(self.row, contact + rubbing)
@@ -61,7 +61,7 @@ class Joint(NamedTuple):
 
 
 class Structure(NamedTuple):
-    """Modes q'' = -alpha q' - omega^2 (q + stiffening q^3) + pushes of half-sines; q^2 is the linear energy.
+    """Modes q'' = -alpha q' - omega^2 (q + stiffening q^3) + half-sine pushes; q^2 is the linear energy.
 
     ``omega``, ``stiffening`` of shape (k,); ``pushes`` of shape (p, 2 + k): start, end, and height on each mode.
     """
@@ -90,7 +90,7 @@ class Structure(NamedTuple):
     def move(
         self, start: float, end: float, state: Samples
     ) -> Callable[[Samples], Samples]:
-        """Integrate from a state, q and q' in one; give both at any times, shape (2 k, n)."""
+        """Integrate from a state that contains q and q'; return both at any times, shape (2 k, n)."""
         stops = np.unique(
             np.clip([start, *self.pushes[:, :2].ravel(), end], start, end)
         )
@@ -125,7 +125,7 @@ class Structure(NamedTuple):
         return np.asarray(course @ self.pushes[:, 2:])
 
     def compute_paths(self, states: Samples) -> Samples:
-        """Return where free runs from states of shape (2 k, n) go, as points in the energy norm, shape (n, d)."""
+        """Return the motion of free runs from states of shape (2 k, n), as points in the energy norm, shape (n, d)."""
         free = self.release_loads()
         if self.is_linear:
             return np.asarray(
@@ -136,7 +136,7 @@ class Structure(NamedTuple):
         )
 
     def _integrate_paths(self, states: Samples, settings: Mapping[str, Any]) -> Samples:
-        """Integrate all states at once, of shape (2 k, n); give points of shape (n, d)."""
+        """Integrate all states of shape (2 k, n) at once; return points of shape (n, d)."""
         end = COMPARED * 2 * np.pi / float(self.omega.min())
         times = np.linspace(0.0, end, _COMPARED_AT)
         answer = solve_ivp(
@@ -149,7 +149,7 @@ class Structure(NamedTuple):
         return np.moveaxis(points, 2, 0).reshape(states.shape[1], -1)
 
     def compute_energies(self, states: Samples) -> tuple[Samples, Samples]:
-        """Return elastic energy, without that of the joint, and kinetic energy of states (2 k, n), each (k, n)."""
+        """Return elastic energy (without that of the joint) and kinetic energy of states (2 k, n), each (k, n)."""
         q, speed = np.split(states, 2)
         return q**2 + self.stiffening[:, np.newaxis] * q**4 / 2, (
             speed / self.omega[:, np.newaxis]
@@ -162,7 +162,7 @@ class Structure(NamedTuple):
         q, speed = (
             states[:count],
             states[count:],
-        )  # np.split would take a fifth of the time
+        )  # np.split would take 20 % of the time
         square = self.omega[:, np.newaxis] ** 2
         force = (
             -square * (q + self.stiffening[:, np.newaxis] * q**3) - self.alpha * speed
@@ -196,7 +196,7 @@ class IntegratedRun(NamedTuple):
         return points, np.linalg.norm(points, axis=1)
 
     def release(self, time: Samples) -> Samples:
-        """Return the points of runs from rest with the deformation of these times, shape (n, d)."""
+        """Return the points of runs that start at rest with the deformation at these times, shape (n, d)."""
         deformation, velocity = np.split(self.states(time), 2)
         return self.structure.compute_paths(
             np.concatenate([deformation, np.zeros_like(velocity)])

@@ -1,4 +1,4 @@
-"""The true error R of any pair, and the least error that a flight allows.
+"""The true error R of any pair, and the smallest error that a flight allows.
 
 The state of a vibration is a point in a space whose squared lengths are energies.  The switched run starts at td with
 the deformation of tr, at rest; R is its distance from the reference run there, over the size of the vibration.
@@ -14,21 +14,21 @@ from scipy.ndimage import minimum_filter
 if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
 
-# Times of the search per period of the fastest mode, and their least number.
+# Number of times per period of the fastest mode in the search, and the smallest total number.
 _DENSITY: Final = 24
 _FEWEST: Final = 100
-# Times between two neighbours of the search at which a minimum is refined.
+# Number of times between two neighbours in the search at which a minimum is refined.
 _FINER: Final = 10
-# The deepest of the local minima, any of which may hold the least error.
+# Number of the deepest local minima that are refined, because any of them may contain the smallest error.
 _VALLEYS: Final = 12
 
 
 class Vibration(Protocol):
-    """Motion known at any time, as points in the energy norm; all times are in its own unit."""
+    """Motion that is known at any time, as points in the energy norm; all times are in its own unit."""
 
     @property
     def most_times(self) -> int:
-        """Number of times that a search can afford."""
+        """Largest number of times for which a search is fast enough."""
         ...
 
     @property
@@ -46,7 +46,7 @@ class Vibration(Protocol):
 
 
 class Truth(NamedTuple):
-    """The true errors of pairs of a record: its ``vibration``, the ``flight`` from start to end, in its own unit.
+    """The true errors of pairs of a record, with its ``vibration`` and the ``flight`` (start, end) in its own unit.
 
     ``unit``: times of the file over those of the vibration.
     """
@@ -69,7 +69,7 @@ class Truth(NamedTuple):
         return float(errors[0, 0])
 
     def find_least_residual(self, td: float | None, shortest: float = 0.0) -> float:
-        """Return the least true R in the flight, of pairs that are rigid for at least the ``shortest`` time.
+        """Return the smallest true R in the flight among pairs that are rigid for at least the ``shortest`` time.
 
         With ``td`` the only choice is tr, and ``shortest`` does not count.  Times are those of the file.
         """
@@ -115,5 +115,5 @@ class Truth(NamedTuple):
 
 
 def _surround(times: Samples, nearby: Samples, flight: tuple[float, float]) -> Samples:
-    """Return the times and those that are so near to each, within the flight."""
+    """Return the times and the times close to each of them, within the flight."""
     return np.clip(np.add.outer(times, nearby).ravel(), *flight)

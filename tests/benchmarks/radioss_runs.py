@@ -1,4 +1,4 @@
-"""Compare `check` with the listings of OpenRadioss for random Radioss runs: which part is rigid when.
+"""Compare `check` with the listings of OpenRadioss for random Radioss runs: when each part is rigid.
 
 ``OPENRADIOSS_PATH=... python -m tests.benchmarks.radioss_runs 20 1`` writes 20 runs with seeds from 1 on, lets the
 solver compute them, and compares the windows of `check` with the listings.  Bodies have groups of parts or of nodes,
@@ -55,7 +55,7 @@ def write_group(chance: random.Random, part: int) -> tuple[int, str]:
 
 
 def write_sensors(chance: random.Random) -> str:
-    """Write two clocks and one sensor of both, number 7."""
+    """Write two time sensors and a sensor that combines both, number 7."""
     times = [chance.randint(0, 6) / 1000 for _ in range(4)]
     clocks = write_clock(5, times[0], chance.choice([None, times[1]])) + write_clock(
         6, times[2], chance.choice([None, times[3]])
@@ -68,7 +68,7 @@ def write_sensors(chance: random.Random) -> str:
 def write_leg(
     chance: random.Random, nodes: list[int], bodies_off: set[int], *, first: bool
 ) -> str:
-    """Write what a leg switches: main nodes in any order, over several lines or cards; maybe a reset.
+    """Write the switches of a leg: main nodes in any order, over several lines or cards; possibly a reset.
 
     ``off`` are the nodes whose bodies are off by now.  The listing of one that is switched on while it is on would say
     that it begins to be rigid there.
@@ -131,7 +131,7 @@ def draw_run(seed: int) -> Listed:
 
 
 def spread_over_files(folder: Path, chance: random.Random, starter: str) -> None:
-    """Move the bodies of a run into an included file, or into a file that this one includes; drop final line ends."""
+    """Move the bodies of a run to an included file, or to a file included by it; drop final line endings."""
     main = folder / "X_0000.rad"
     text = main.read_text()
     if starter and chance.random() < 0.5:
@@ -152,7 +152,7 @@ def spread_over_files(folder: Path, chance: random.Random, starter: str) -> None
 
 
 def compare(folder: Path, seed: int) -> str:
-    """Compare `check` with the listing of a run; empty where both agree."""
+    """Compare `check` with the listing of a run; return an empty text if both agree."""
     run = draw_run(seed)
     main = write_run(folder, run)
     spread_over_files(folder, random.Random(seed), run.starter)

@@ -46,7 +46,7 @@ _FIRST = "507c24f"  # version 0.6.0
 _PARTS, _PART_STATES = 500, 2000
 _ROWS = 1_000_000
 _ROUNDS = 7
-_ROOM = 64  # MB that reading may take beside twice the answer
+_ROOM = 64  # memory that reading may need in addition to twice the answer [MB]
 _folder = TemporaryDirectory()
 
 Numbers = tuple[list[float], list[float]]
@@ -200,7 +200,7 @@ def memory_over_limit(kind: str) -> float:
 
 
 def _measure_memory(file: Path, times: int) -> float:
-    """Return the peak memory of reading over its limit: ``times`` the energies plus some room."""
+    """Return the peak memory of reading over its limit: ``times`` the energies plus a constant."""
     code = (
         "import sys; from pathlib import Path; from d2rpick.histories.opening import Selection, open_run\n"
         "def anonymous():\n"
@@ -300,7 +300,7 @@ def hdf5_to_h5py() -> float:
 
 
 def hdf5_to_h5py_here() -> float:
-    """Return the same in this process, with the child process that tests if the library crashes on the file."""
+    """Return the same ratio in this process, including the child process that tests whether the file crashes h5py."""
     import h5py
 
     file = _write_hdf5()

@@ -33,13 +33,13 @@ HEAD = (
 
 
 def rehearse_set(number: int) -> Rehearsal:
-    """Rehearse one set with a tr every 6 ms in the trip."""
+    """Rehearse one set, with a tr every 6 ms in the trip."""
     with TemporaryDirectory() as folder:
         return rehearse(SETS[number], Path(folder), stride=2)
 
 
 def format_line(number: int, trial: Rehearsal) -> tuple[str, bool]:
-    """Return the line about one set, and True if it is right."""
+    """Return the line about one set, and True if the set passes."""
     p, run = trial.parameters, trial.reference
     good = trial.roll_share < 0.1 and abs(trial.energy_off) < 0.25
     text = (

@@ -28,7 +28,7 @@ from tests.test_cluster import cluster
 ROOT = Path(__file__).resolve().parents[2]
 TD = 0.0687534
 RUNS, STATES, FEW, ROUNDS = 1000, 10_000, 100, 3
-# Of the loop; kB of memory for each further run.
+# Limits of the cost relative to the loop, and of the memory for each further run [kB].
 MOST, MOST_GROWN = 1.25, 25.0
 LOOP = f"""
 import sys
@@ -95,7 +95,7 @@ def cluster_overhead(workers: int) -> float | None:
 
 def process(*args: str) -> tuple[float, float, bytes]:
     """Run a command; return its time [s], the peak memory of its largest process [MB], and its output."""
-    # the peak is that of the largest child so far, so each command has a parent of its own
+    # the peak is that of the largest child process so far, so each command has its own parent process
     code = (
         "import json, subprocess, sys, time; from resource import *; start = time.perf_counter();"
         "out = subprocess.run(sys.argv[1:], stdout=subprocess.PIPE, check=True).stdout;"
@@ -112,7 +112,7 @@ def process(*args: str) -> tuple[float, float, bytes]:
 
 
 def measure_study(names: list[str], *options: str) -> tuple[float, float]:
-    """Return time [s] and peak memory [MB] of a study in which every run has a tr and all share one."""
+    """Return time [s] and peak memory [MB] of a study in which every run has a tr and a common tr exists."""
     args = (
         "-m",
         "d2rpick",

@@ -1,4 +1,4 @@
-"""Timing of compared calls: in turns, by medians."""
+"""Timing of calls that are compared: alternating calls, medians."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def measure_ratio(
     repeats: int = 1,
     cost: Callable[[Callable[[], object]], float] = measure_seconds,
 ) -> float:
-    """Return ``cost`` of ``first_call`` over that of ``second_call``, in turns of this number of repeats.
+    """Return the ``cost`` of ``first_call`` over that of ``second_call``, from this number of alternating repeats.
 
     With more than one repeat each turn begins with an unmeasured call, so that the measured ones find their memory.
     """

@@ -1,4 +1,4 @@
-"""Choices of suggest and verdicts of verify: a recommended pair verifies, and each record is examined once."""
+"""Choices of suggest and verdicts of verify: a recommended pair passes verify, and each record is examined once."""
 
 from functools import partial
 from typing import Any
@@ -188,7 +188,7 @@ def test_verify_measures_what_suggest_measures() -> None:
 
 
 def make_ringing_history() -> History:
-    """Return three modes with noise, finely sampled; a tr for several modes may be a closest match, off the level."""
+    """Return three finely sampled modes with noise, for which a tr may be a closest match that is not at the level."""
     time = np.linspace(0, 0.5, 10_001)
     modes = [(5, 4, 300, 0.3), (2, 6, 777, 1), (1, 9, 1500, 2)]
     energy = sum(
@@ -217,7 +217,7 @@ def test_verify_remarks_what_suggest_remarks_on_every_tr() -> None:
 
 @st.composite
 def histories(draw: st.DrawFn) -> History:
-    """Draw a load that falls, then one or two modes, damped or not, with noise, finely or coarsely sampled."""
+    """Draw a load that falls, then one or two modes, with or without damping and noise, finely or coarsely sampled."""
     count, rng = (
         draw(st.integers(12, 90)),
         np.random.default_rng(draw(st.integers(0, 2**32 - 1))),
@@ -242,7 +242,7 @@ def histories(draw: st.DrawFn) -> History:
 
 
 def verify_pair(history: History, pair: Pair | None, settings_asked: Settings) -> bool:
-    """Return True if a pair verifies; no pair counts as verified."""
+    """Return True if a pair passes verify; a missing pair counts as passing."""
     if pair is None:
         return True
     return verify_in_history(history, pair.tr, pair.td, settings_asked).admissible
@@ -316,7 +316,7 @@ def test_too_few_states_per_period_recommend_nothing(rate: float) -> None:
 
 
 def test_fewer_states_per_period_never_tell_more() -> None:
-    """A mode of 9 states per period is graded like one of half as many."""
+    """A mode with 9 states per period gets the same grade as a mode with half as many."""
     time = np.linspace(0, 10, 211)
     history = make_energy_history(np.exp(-0.05 * time) * np.sin(7.3 * time) ** 2, time)
     thinned = make_energy_history(history.energy[::2], time[::2])
@@ -329,7 +329,7 @@ def test_fewer_states_per_period_never_tell_more() -> None:
 
 @pytest.mark.parametrize("rate", [7.3, 14.6, 18.0])
 def test_lines_need_fewer_states_per_period_than_a_level(rate: float) -> None:
-    """6, 3 and 2.4 states in a period of the energy, of which an oscillator or a level needs 10."""
+    """6, 3 and 2.4 states per energy period; an oscillator or a level needs 10."""
     td, damping = 8.0, 0.025
     answer = suggest_in_history(make_coarse_history(rate), td, Settings())
     assert answer.situation.basis == "modal"

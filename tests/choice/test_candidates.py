@@ -1,4 +1,4 @@
-"""Candidates for tr: the times offered, their measures, and the reasons against them."""
+"""Candidates for tr: the times offered, their measures, and the objections to them."""
 
 import numpy as np
 import pytest
@@ -75,7 +75,7 @@ def test_td_on_the_highest_peak_of_an_undamped_record_has_extrema_for_candidates
     history = make_vibration_energy()
     answer = suggest_in_history(history, 3.25, PLAIN)
     assert {c.kind for c in answer.candidates if c.acceptable} == {"extremum"}
-    # The peak at 0.75 has the opposite sign; of 0.25, 1.25 and 2.25 the earliest keeps the parts rigid longest.
+    # The peak at 0.75 has the opposite sign; of 0.25, 1.25 and 2.25, the earliest keeps the parts rigid longest.
     assert require(answer.recommended).tr == pytest.approx(0.25, abs=1e-6)
     assert require(answer.recommended).residual == pytest.approx(0.0, abs=1e-6)
 

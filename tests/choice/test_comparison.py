@@ -30,6 +30,7 @@ from tests.command import (
     BOX,
     ENERGY,
     ROLLOVER,
+    join_wrapped_lines,
     make_replay_file as motion,
     put,
     read_refusal,
@@ -79,7 +80,7 @@ def verify_rollover(*options: str) -> dict[str, Any]:
     return run_json(*VERIFY, BOX, "--switched", LEGS, *options)
 
 
-# A rollover, computed by a solver whose rigid parts report neither kinetic energy nor momentum.
+# A rollover computed by a solver whose rigid parts report neither kinetic energy nor momentum.
 
 
 def test_a_switched_rollover_flies_as_its_reference_with_less_vibration() -> None:
@@ -91,7 +92,7 @@ def test_a_switched_rollover_flies_as_its_reference_with_less_vibration() -> Non
     # Interpolated between every tenth state; between all states it is 1.7492.
     assert switched["energy_td"] == pytest.approx(1.7515, abs=1e-4)
     assert switched["level_ratio"] == switched["energy_frozen"] / switched["energy_td"]
-    # The means of the table reach to 380 ms and use every tenth state; the contact is at 381.9 ms.
+    # The means in the table extend to 380 ms and use every tenth state; the contact occurs at 381.9 ms.
     assert switched["mean_after"] == pytest.approx(
         expected["IEmean_td_to_380ms_J"], rel=0.01
     )
@@ -124,8 +125,22 @@ def test_a_mean_energy_that_is_another_one_is_an_objection() -> None:
     assert verify_rollover("--min-mean-energy", "0.6")["verified"]
 
 
+@pytest.mark.parametrize("grade", ["poor", "fair"])
+def test_a_failed_comparison_is_a_failure_whatever_grade_is_accepted(
+    grade: str,
+) -> None:
+    accepting = (*VERIFY, BOX, "--switched", LEGS, "--min-quality", grade)
+    failed = run(*accepting)
+    assert failed.exit_code == 1
+    assert "comparison failed" in join_wrapped_lines(failed.stdout)
+    assert failed.stderr.count("exit code") == 1
+    assert "the comparison with the switched run failed" in failed.stderr
+    assert run(*accepting, "--exit-zero").exit_code == 0
+    assert run(*accepting, "--min-mean-energy", "0.6").exit_code == 0
+
+
 def test_the_times_are_read_off_the_switched_run() -> None:
-    """Its states are 0.5 ms apart; the option must not swallow the history argument after it."""
+    """Its states are 0.5 ms apart. The option must not take the following history argument as its value."""
     verdict = run_json("verify", "--part", "box", "--switched", LEGS, BOX)
     assert (verdict["tr"], verdict["td"]) == (
         pytest.approx(0.1, abs=5e-4),
@@ -160,7 +175,7 @@ def test_a_run_without_rigid_times_is_refused_with_the_cause() -> None:
 
 
 def test_round_off_in_a_fall_counts_as_constant() -> None:
-    """Before the landing both runs hold nothing but round-off, which differs from state to state."""
+    """Before the landing, both runs contain only round-off, which differs from state to state."""
     landed = np.where(TIME > 0.705, np.sin(40 * TIME) ** 2, 0.0)
     noise = 1e-12 * np.random.default_rng(1).random((2, TIME.size))
     falling, rigid = (make_history(landed + values) for values in noise)
@@ -185,7 +200,7 @@ def test_a_leg_in_which_nothing_stands_still_names_those_beside_it(
 def test_of_a_fall_the_times_are_not_guessed_and_given_ones_verify(
     tmp_path: Path,
 ) -> None:
-    """Nothing vibrates before the landing: the energies of both runs are round-off until then."""
+    """Nothing vibrates before the landing, so the energies of both runs are round-off until then."""
     box = ("rollover", "--drop", "0.1", "--mesh", "4", "--t-end", "0.18")
     names = [str(tmp_path / f"{name}.matsum") for name in ("reference", "switched")]
     for name, switches in zip(names, ((), ("--tr", "0", "--td", "0.13")), strict=True):
@@ -295,7 +310,7 @@ def test_a_switched_table_is_compared_by_its_energy(
     assert switched["notes"] == []
 
 
-# The closed form, written in the format of a solver.
+# The closed form of the oscillator, written in the format of a solver.
 
 
 @pytest.fixture
@@ -629,7 +644,7 @@ def test_a_right_switched_run_of_a_crushed_body_was_rigid_from_tr_to_td(
 def test_where_the_reference_stands_still_too_a_longer_stillness_is_no_objection() -> (
     None
 ):
-    """A body that flies from the start and hardly vibrates: its energy does not show when it was switched."""
+    """A body that flies from the start and hardly vibrates, so that its energy does not show when it was switched."""
     energy = 5 + np.where(LONG > 0.9, LONG - 0.9, 0.0)
     comparison = compare_runs(
         make_history(energy, LONG),
@@ -683,7 +698,7 @@ def test_no_output_replaces_a_file_of_the_switched_run(tmp_path: Path) -> None:
 
 
 def list_legs(run: str) -> list[str]:
-    """Return the restart segments of a run; up to tr all runs share them."""
+    """Return the restart segments of a run; up to tr, all runs share them."""
     return [
         locate_stored(name)
         for name in ("car_all_T01.gz", f"{run}_T02.gz", f"{run}_T03.gz")
@@ -744,7 +759,7 @@ def test_parts_that_were_not_rigid_are_named() -> None:
 
 
 def test_energies_that_are_reported_wrongly_do_not_enter_the_comparison() -> None:
-    """The battery reports 70 400 J instead of 21; shells and beams keep 1.019 of their mean energy."""
+    """The battery reports 70 400 J instead of 21 J; shells and beams keep 1.019 of their mean energy."""
     switched_run = require(compare_car("car_heavy", "1-17").switched)
     assert switched_run.mean_after / switched_run.mean_after_reference == pytest.approx(
         1.019, abs=0.002

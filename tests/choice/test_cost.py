@@ -66,7 +66,7 @@ def test_shares_of_parts_of_one_formulation_are_those_of_their_elements() -> Non
 def test_shells_cost_more_with_more_integration_points(
     layers: int | None, extra: int
 ) -> None:
-    """Four points per layer, of which 3 are assumed; without a weight for points they cost nothing."""
+    """Four points per layer, 3 of which are assumed; without a weight for points, they cost nothing."""
     of_deck = require(find_radioss_formulation("shell", 12, 0, 0))
     mesh = make_inventory({1: 30, 2: 70}, formulations={2: UNKNOWN})
     parts = {

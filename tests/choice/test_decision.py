@@ -1,4 +1,4 @@
-"""One verdict on a pair: the same in every command, with a reason and a cure unless it is good."""
+"""One verdict on a pair, which is the same in every command and has a reason and a cure unless it is good."""
 
 from html import unescape
 
@@ -60,7 +60,7 @@ def test_nothing_is_verified_or_acceptable_whose_error_exceeds_a_half() -> None:
 
 
 def test_a_cause_of_the_motion_is_not_excused_by_the_worth_of_the_vibration() -> None:
-    """Gravity that is not known makes the motion poor; the energy of the vibration error has nothing to do with it."""
+    """Unknown gravity makes the motion poor, independently of the energy of the vibration error."""
     table = d2.read(str(ROOT / "sample_data/rollover_box_excel.csv"))
     decision = require(d2.suggest(table).decision)
     quality = decision.quality

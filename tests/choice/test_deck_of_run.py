@@ -1,4 +1,4 @@
-"""Evidence from the deck of a run, and deck errors that make it useless; decks of other models are ignored."""
+"""Evidence from the deck of a run, and deck errors that make the run useless; decks of other models are ignored."""
 
 import shutil
 from dataclasses import replace
@@ -55,7 +55,7 @@ ASKED = {
     "plan": ("--part", "all", "--no-verify"),
     "parts": ("--part", "all"),
 }
-# Parts with the numbers of the box under other titles; and with its titles under other numbers.
+# Decks with the part numbers of the box under other titles, and with its titles under other numbers.
 OTHER = {
     "titles": DECK.read_text("utf-8")
     .replace("\nbox\n", "\nfloor\n")

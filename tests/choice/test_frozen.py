@@ -1,4 +1,4 @@
-"""A switched run is recognised by its energy alone, and a reference run is never taken for one."""
+"""A switched run is recognised by its energy alone, and a reference run is never treated as a switched run."""
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ def compute_reference(time: np.ndarray, damping: float, preload: float) -> np.nd
 def compute_switched(
     time: np.ndarray, tr: float, td: float, damping: float, preload: float
 ) -> np.ndarray:
-    """Return the energy of the run that is rigid from tr to td, and released at rest with the deformation of tr."""
+    """Return the energy of a run that is rigid from tr to td and released at rest with the deformation at tr."""
     before = compute_reference(time, damping, preload)
     frozen = compute_reference(np.array([tr]), damping, preload)[0] - preload
     after = np.exp(-damping * (time - td)) * np.cos(OMEGA * (time - td))
@@ -45,7 +45,7 @@ def test_the_rigid_time_is_found_to_within_a_state(
     share: float, damping: float, preload: float, states: int
 ) -> None:
     time = np.linspace(0.0, END, states)
-    # Half a period after the start the deformation has its full range of levels.
+    # Half a period after the start, the deformation has passed through its full range of levels.
     tr = (2 + share) * np.pi / OMEGA / 2
     history = make_history(time, compute_switched(time, tr, TD, damping, preload))
     ((start, end),) = find_frozen_times(history)

@@ -20,7 +20,7 @@ from tests.made_t01 import make_t01, make_value
 
 TIME: Samples = np.linspace(0.0, 1.0, 201)
 ONES = np.ones_like(TIME)
-# A body that is thrown up and vibrates: internal energy 2 J, the work of gravity a parabola.
+# A body that is thrown up and vibrates: internal energy 2 J, and a parabola as the work of gravity.
 INTERNAL = 2.0 + np.sin(60 * TIME)
 WORK = -100.0 * TIME * (1.0 - TIME)
 KINETIC = 50 + WORK - np.sin(60 * TIME)
@@ -33,7 +33,7 @@ PART = Part(7, "floor")
 WINDOW = (0.2, 0.8)
 
 LOADED = np.linspace(0, 0.1, 201)
-# A body that is shaken, and falls apart between two states at 0.03.
+# A body that is shaken and falls apart between two states at 0.03.
 TORN = LOADED > 0.03
 TORN_INTERNAL = np.where(TORN, 8e3, 3 * LOADED)
 TORN_KINETIC = np.where(TORN, 1.5e13, 0.2 * np.sqrt(LOADED))
@@ -74,7 +74,7 @@ def test_a_healthy_run_gets_no_warning_and_keeps_all_limits() -> None:
         ("work-in-window", {"external_work": WORK + 0.1 * TIME}, {"external_work": WORK + 0.5 * (TIME > 0.5)}),
         ("erosion", {"eroded": 0.01 * (TIME > 0.1)}, {"eroded": 0.01 * (TIME > 0.5)}),
         ("eroded-energy", {"eroded": 0.1 * (TIME > 0.1)}, {"eroded": 0.2 * (TIME > 0.1)}),
-        # Separately recorded friction is no penetration, and rounding of printed digits is no work.
+        # Friction recorded separately is not penetration, and rounding of printed digits is not work.
         ("sliding", {"sliding": 1.0 * (TIME < 0.1), "friction": 0.9 * (TIME < 0.1)}, {"sliding": 1.0 * (TIME < 0.1)}),
         ("work-in-window", {"external_work": PRINTED, "precision": Precision(digits=6)}, {"external_work": PRINTED}),
     ],
@@ -369,11 +369,11 @@ def test_a_run_that_gains_energy_from_nothing_blew_up(
         # A load on a body at rest (except round-off), and a body that hits a wall after free fall.
         (np.where(LATE, 40.0, 1e-13), np.where(LATE, 1e3, 1e-12), {}),
         (np.where(LATE, 200.0, 1e-18), np.where(LATE, 20.0, 220.0), {}),
-        # A velocity given to the whole body, at rest or in the noise of a contact, does not deform it.
+        # A velocity given to the whole body, at rest or in the noise of a contact, does not deform the body.
         (np.where(LATE, 2e-9, 1e-9), np.where(LATE, 1e5, 1e-9), {}),
         (0 * LOADED, np.where(LATE, 1e5, 1.9e-9), {}),
         (np.where(LATE, 1e-5, 0.0), np.where(LATE, 1e5, 1.9e-9), {}),
-        # Energy explained by external work, and a gain that a load can cause.
+        # Energy explained by external work, and an energy gain that a load can cause.
         (
             TORN_INTERNAL,
             TORN_KINETIC,
@@ -403,7 +403,7 @@ def test_energies_of_nothing_are_nothing_to_judge() -> None:
     ]
     assert (
         list_objections(record(1e-18 + 0 * LOADED, 225.0 * LOADED)) == []
-    )  # free fall does not deform anything yet
+    )  # free fall does not yet deform anything
     assert (
         list_objections(make_energy_history(0 * LOADED, LOADED)) == []
     )  # a single column is judged by its energy alone

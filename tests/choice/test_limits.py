@@ -1,4 +1,4 @@
-"""A limit of a recommendation refuses, is explained, and cuts windows, whichever quantity it limits."""
+"""A limit of a recommendation refuses pairs, is explained, and cuts windows, whatever quantity it limits."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ from tests.command import ENERGY
 
 TR, TD = 0.0135867, 0.0687534
 REFERENCE = read_reference([ENERGY])
-# More than the whole record: no pair keeps it.
+# A limit longer than the record, which no pair can meet.
 ENDLESS = 1.0
 
 
@@ -31,7 +31,7 @@ class WithLeastRigidTime(Settings):
 
     @property
     def limits(self) -> Iterator[tuple[Limit, float]]:
-        """The limits that are set, and the made-up one."""
+        """The limits that the user has set, and the made-up one."""
         yield from super().limits
         yield Limit("rigid_time", is_lower=True), self.least_rigid_time
 

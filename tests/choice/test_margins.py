@@ -1,4 +1,4 @@
-"""Margins of a box that tumbles after its first landing, whose parts lie on a line: with and without its deck."""
+"""Margins of a box whose parts lie on a line and that tumbles after its first landing, with and without its deck."""
 
 from collections.abc import Sequence
 
@@ -38,7 +38,7 @@ def placement(tmp_path_factory: pytest.TempPathFactory) -> Placement:
 def test_where_nothing_shows_how_a_box_tumbles_the_margin_allows_for_any_rotation(
     box: tuple[History, Sequence[Flight]], placement: Placement
 ) -> None:
-    """The box falls without rotation from rest; then its parts on a line and no node show how it tumbles."""
+    """The box falls from rest without rotation; its parts on a line, and no node, show how it tumbles."""
     history, (fall, *tumbling) = box
     with_deck = Settings(placement=placement)
     assert find_margin(history, fall, with_deck) == find_margin(

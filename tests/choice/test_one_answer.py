@@ -39,7 +39,7 @@ from tests.energies import (
 from tests.reading import read
 
 PLAIN = Settings()
-# The level alone is poor here: no oscillator describes the box, and none is searched.
+# The level alone gives poor pairs here, because no oscillator describes the box and none is searched for.
 LEVEL = Settings(replay=False, min_quality="poor")
 planned = cache(plan_run)
 
@@ -203,7 +203,7 @@ def test_an_error_that_is_refused_reads_as_too_large() -> None:
 
 @pytest.mark.slow
 def test_a_plan_knows_a_flight_as_surely_as_the_td_in_it() -> None:
-    """An oscillator fits around some td of the flight, but not around the chosen one."""
+    """An oscillator fits around some td of the flight, but not around the chosen td."""
     rng, time = np.random.default_rng(0), np.linspace(0, 1, 1500)
     load, contact, omega, alpha = (
         rng.uniform(0.05, 0.3),
@@ -249,7 +249,7 @@ def test_a_flight_whose_start_is_given_ends_where_the_oscillator_does() -> None:
 
 @pytest.mark.slow
 def test_a_card_says_the_same_of_a_pair_whoever_prints_it(tmp_path: Path) -> None:
-    """This includes the health of the run, and a td that is printed with other digits than chosen."""
+    """This includes the health of the run, and a td that is printed with other digits than those chosen."""
     time = np.linspace(0, 1, 1500) / 7
     values = np.stack(
         [time, np.exp(-time) * np.sin(280 * time) ** 2, 0.2 + 0 * time], axis=1

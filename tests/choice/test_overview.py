@@ -120,7 +120,7 @@ def test_info_lists_the_flights_that_plan_and_suggest_choose_from(
         ]
     chosen = run_json("suggest", *args)["flight"]
     assert chosen["source"] in [flight_row["source"] for flight_row in listed]
-    if chosen["source"] != "energy":  # the energy shows another flight for each td
+    if chosen["source"] != "energy":  # the energy shows a different flight for each td
         assert [flight_row["start"] for flight_row in listed] == [
             row["flight_start"] for row in planned
         ]

@@ -1,4 +1,4 @@
-"""Plans: flights, windows and what one reference supports, for computed runs of the box and of a real solver."""
+"""Plans: flights, windows and what one reference run supports, for computed runs of the box and of a solver."""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -25,10 +25,10 @@ from tests.energies import (
 )
 from tests.reading import read, read_solved
 
-# The level alone is poor here: no oscillator describes these runs, and none is searched.
+# The level alone gives poor pairs here, because no oscillator describes these runs and none is searched for.
 PLAIN = Settings(replay=False, min_quality="poor")
 BOX = Selection(parts=("box",))
-# A car grazes its second push; the margin for a grazing contact leaves no time between the pushes, this one does.
+# A car grazes its second push. The margin for a grazing contact leaves no time between the pushes; this margin does.
 SHORT_MARGIN = replace(PLAIN, margin=0.0015)
 
 
@@ -204,7 +204,7 @@ def test_where_nothing_vibrates_td_lies_as_late_as_the_margin_allows(
     ]
     assert [row.number for row in resting] == [
         1
-    ]  # after it there is plastic work, with little vibration above it
+    ]  # afterwards, there is plastic work with little vibration above it
     for row in resting:
         room = max(row.margin.time, 2 * (row.margin.spread or 0.0))
         assert require(row.window)[1] == pytest.approx(row.end - room, abs=1e-5)
@@ -319,7 +319,7 @@ def test_the_switched_car_landed_as_computed() -> None:
 
 @pytest.mark.slow
 def test_flights_of_the_energy_alone_end_before_the_next_begins(tmp_path: Path) -> None:
-    """Before and after a load, the energy alone shows overlapping flights; they must not share a window."""
+    """Before and after a load, the energy alone shows overlapping flights, which must not share a window."""
     record = drop(tilt=35.0, interval=1e-4)
     rows = zip(record.time.tolist(), record.internal_energy[:, 0].tolist(), strict=True)
     table = tmp_path / "energy.csv"
@@ -339,7 +339,7 @@ def test_flights_of_the_energy_alone_end_before_the_next_begins(tmp_path: Path) 
 
 
 def make_bouncing_energy(seed: int) -> Reference:
-    """Return the energy of a run with two to five impacts, each of which starts another vibration."""
+    """Return the energy of a run with two to five impacts, each of which starts a different vibration."""
     rng = np.random.default_rng(seed)
     time = np.linspace(0.0, 1.0, int(rng.integers(300, 900)))
     plastic, elastic = np.zeros_like(time), np.zeros_like(time)
@@ -357,7 +357,7 @@ def make_bouncing_energy(seed: int) -> Reference:
 @given(seed=st.integers(0, 100_000))
 @example(seed=204)  # the energy shows no end of the flight here
 def test_a_window_of_the_energy_alone_lies_in_its_flight(seed: int) -> None:
-    """The energy shows another flight start for each td; a window must not begin before the flight of its row."""
+    """The energy shows a different flight start for each td; a window must not begin before the flight of its row."""
     reference = make_bouncing_energy(seed)
     plan = plan_run(reference, PLAIN)
     for row in plan.flights:
@@ -422,7 +422,7 @@ def test_a_short_window_that_locks_in_energy_is_left_out_for_a_much_longer_one(
 def test_a_grazing_push_may_come_before_any_window_between_two_pushes(
     car: Reference,
 ) -> None:
-    """The second push takes little momentum at first, so that a car out of place may meet it at any time before."""
+    """The second push takes little momentum at first, so a displaced car may meet it at any earlier time."""
     planned = plan_run(car, PLAIN)
     assert list_statuses(planned) == ["left-out", "supported"]
     between, after = planned.flights

@@ -1,4 +1,4 @@
-"""Grades and stated residuals hold for motions that are integrated, and for motions of parts."""
+"""Grades and stated residuals are right for motions that are integrated, and for motions of parts."""
 
 from itertools import islice
 from pathlib import Path
@@ -41,7 +41,7 @@ from tests.vibration.test_identify import move_about_preload
 def test_what_was_upside_down_has_the_sign_of_td(
     name: str, seed: int, number: int, tmp_path: Path
 ) -> None:
-    """The energy alone, or an oscillator about a preload, gives these pairs the opposite sign: residuals of 2."""
+    """The energy alone, or an oscillator about a preload, gives these pairs the wrong sign, with residuals of 2."""
     pair = require(
         ask_for_pair(CLASSES[name](np.random.default_rng([seed, number])), tmp_path)
     )
@@ -52,19 +52,19 @@ def test_what_was_upside_down_has_the_sign_of_td(
 @pytest.mark.parametrize(
     ("name", "seed", "number"),
     [
-        # An oscillator describes only a short part of these, for the mean energy drifts.
+        # An oscillator describes only a short part of these records, because the mean energy drifts.
         ("drift and heating", 5, 2),
         pytest.param("drift and heating", 6, 1, marks=pytest.mark.slow),
         # An oscillator seems to describe the end of the load before this flight.
         ("harmonic", 7, 0),
         # Damping takes one mode away in the first fifth of the flight.
         pytest.param("stiffness damping", 7, 1, marks=pytest.mark.slow),
-        # The band is one-sided: other readings of the lines say less.
+        # The band is one-sided, because other interpretations of the lines give smaller residuals.
         ("exchange, 1 % noise", 6, 2),
-        # The first window begins in the load, and its modes convince all the same.
+        # The first window begins in the load, but its modes seem good.
         pytest.param("irregular", 505, 1, marks=pytest.mark.slow),
         pytest.param("10 modes, 1 % noise", 5, 0, marks=pytest.mark.slow),
-        # A hardly longer pair beyond the limit of a good one.
+        # A pair that is hardly longer, but exceeds the limit of a good pair.
         pytest.param("irregular", 6, 0, marks=pytest.mark.slow),
         pytest.param("3 to 5 modes, noise", 6, 3, marks=pytest.mark.slow),
     ],
@@ -86,7 +86,7 @@ def test_a_good_pair_that_exists_is_found_and_called_good(
 def test_a_long_pair_is_not_taken_because_others_are_short(
     name: str, seed: int, number: int, tmp_path: Path
 ) -> None:
-    """R of 0.75 and 0.82 were recommended where pairs as long have 0.25 to 0.43, whose bands are wide."""
+    """R of 0.75 and 0.82 were recommended although pairs of equal length with wide bands have 0.25 to 0.43."""
     record = CLASSES[name](np.random.default_rng([seed, number]))
     pair = require(ask_for_pair(record, tmp_path))
     assert pair.true < 0.5
@@ -95,7 +95,7 @@ def test_a_long_pair_is_not_taken_because_others_are_short(
 
 @pytest.mark.parametrize("percent", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_what_sinks_in_the_noise_is_not_promised(percent: int, tmp_path: Path) -> None:
-    """A residual of 0.8 was stated where 1.05 is true, and one of 0.9 where 1.4 is true: the lines say nothing."""
+    """A residual of 0.8 was stated for a true one of 1.05, and 0.9 for 1.4, because the lines show nothing."""
     record = CLASSES[f"stiffness damping, {percent} % noise"](
         np.random.default_rng([101, 2])
     )
@@ -150,7 +150,7 @@ def test_what_is_stated_of_random_records_holds(kind: str) -> None:
 
 @pytest.mark.slow
 def test_what_the_floor_of_the_swings_hides_is_no_good_pair() -> None:
-    """A residual of 0.32 must not be good, although the lower envelope seems to hide 0.18 at most."""
+    """A residual of 0.32 must not get the grade good, even if the lower envelope seems to hide at most 0.18."""
     record = next(islice(draw_records("parts with mixed modes", 101, 77), 76, None))
     pair = require(recommend_pair(record))
     assert pair.true < BAD or pair.grade != "good"
@@ -158,7 +158,7 @@ def test_what_the_floor_of_the_swings_hides_is_no_good_pair() -> None:
 
 @pytest.mark.slow
 def test_two_planes_turn_no_pair_upside_down() -> None:
-    """The planes have 97 and 3 % of the energy of one part: its minima stay at some per cent of its maxima."""
+    """The planes have 97 and 3 % of the energy of one part, so the minima stay at a few per cent of the maxima."""
     forms = np.array([np.diag([0.97, 0.03, 0.0]), np.diag([0.0, 0.0, 0.5])])
     truth = Motion(
         7.7,

@@ -82,7 +82,7 @@ def test_the_residual_is_given_by_the_energy_halfway() -> None:
     (state_at_tr, middle, state_at_td), (_, middle_rate, after_rate) = (
         MODES.compute_states(np.array([tr, halfway, td]))
     )
-    # The amplitude of each mode halfway, from its state there.
+    # The amplitude of each mode at the middle time, from its state there.
     quadrature = (middle_rate + MODES.decay * middle) / MODES.rate
     amplitudes = middle**2 + quadrature**2
     product = np.sum(
@@ -101,7 +101,7 @@ def test_both_ways_to_the_truth_agree() -> None:
     integrated = IntegratedRun(structure, structure.move(0.0, END, np.zeros(4)))
     first, second = Truth(modes, (1.0, END)), Truth(integrated, (1.0, END))
     for tr, td in ((1.2, 2.0), (1.9, 3.1), (2.5, 3.95)):
-        # Over the compared times, the sum is split unevenly between kinetic and elastic energy of the difference.
+        # Over the compared times, the sum is divided unevenly between kinetic and elastic energy of the difference.
         assert second.compute_residual(tr, td) == pytest.approx(
             first.compute_residual(tr, td), rel=0.02
         )
@@ -171,7 +171,7 @@ def test_the_parts_of_an_exchange_share_one_energy_that_only_damping_takes() -> 
     whole = elastic.sum(axis=1) + kinetic
     assert whole == pytest.approx(np.full_like(whole, whole[0]))
     early, late = (elastic[part] for part in (slice(0, 60), slice(None)))
-    assert early[:, 0].max() > 3 * early[:, 1].max()  # only the frame was hit
+    assert early[:, 0].max() > 3 * early[:, 1].max()  # only the frame was pushed
     assert late[:, 1].max() > 3 * early[:, 1].max()
 
 

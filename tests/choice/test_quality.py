@@ -1,4 +1,4 @@
-"""Order of candidates, limits of a recommendation, and its grade."""
+"""Order of candidates, limits of a recommendation, and the grade."""
 
 import re
 from dataclasses import replace
@@ -12,6 +12,7 @@ from hypothesis import given, settings, strategies as st
 
 from d2rpick.api import read, verify
 from d2rpick.choice.answers import suggest_in_history, verify_in_history
+from d2rpick.choice.pair.candidates import Candidate
 from d2rpick.choice.pair.grades import GRADES
 from d2rpick.choice.pair.quality import (
     EQUALLY_GOOD,
@@ -74,7 +75,7 @@ class Ranked(NamedTuple):
 
 
 def select_alike(ranked: list[Ranked]) -> list[Ranked]:
-    """Return the candidates that the band of the best one does not tell from it, within its grade."""
+    """Return the candidates that the band of the best one does not distinguish from it, within its grade."""
     smallest = min(row.error for row in ranked)
     expected = min(row.expected for row in ranked if row.error == smallest)
     limit = max(smallest, expected)
@@ -104,7 +105,7 @@ def test_the_order_of_candidates(
         is_out_of_place,
         np.full(3, EQUALLY_GOOD),
     ).tolist()
-    # differences in further decimals are rounding
+    # differences in further decimals are due to rounding
     candidate_rows = [
         row._replace(
             error=float(np.round(row.error, 4)),
@@ -145,7 +146,7 @@ def test_the_order_of_candidates(
 
 
 def make_errors(*errors: tuple[float, float, bool]) -> Errors:
-    """Return the errors of candidates from each error, what of it is expected, and whether it is good."""
+    """Return the errors of candidates from each error, the expected part of it, and whether the pair is good."""
     error, expected, is_good = zip(*errors, strict=True)
     return Errors(np.array(error), np.array(expected), np.array(is_good, dtype=bool))
 
@@ -153,15 +154,15 @@ def make_errors(*errors: tuple[float, float, bool]) -> Errors:
 @pytest.mark.parametrize(
     ("errors", "first"),
     [
-        # The band of the shorter pair leaves open whether it is better.
+        # The band of the shorter pair does not show whether that pair is better.
         ([(0.62, 0.57, False), (0.66, 0.6, False)], 1),
         ([(0.58, 0.57, False), (0.66, 0.6, False)], 0),
-        # A pair that may be far worse is not like the best.
+        # A pair that may be far worse is not equal to the best pair.
         ([(0.62, 0.57, False), (1.5, 0.6, False)], 0),
-        # Not beyond the limit of a grade, nor beyond what a release without a vibration has.
+        # The limit is neither above that of a grade nor above the residual of a release without vibration.
         ([(0.55, 0.45, False), (0.6, 0.52, False)], 0),
         ([(1.1, 0.9, False), (1.2, 1.05, False)], 0),
-        # Good pairs are alike; one that is hardly worse than the best of them, but not good, is not.
+        # Good pairs are equally good; a pair that is slightly worse than the best of them, but not good, is not.
         ([(0.1, 0.05, True), (0.2, 0.19, True)], 1),
         ([(0.199, 0.199, True), (0.21, 0.21, False)], 0),
     ],
@@ -182,7 +183,7 @@ def test_a_longer_pair_is_preferred_if_the_bands_do_not_tell_it_from_the_best(
 @pytest.mark.slow
 @pytest.mark.parametrize("parts", ["1-17", "1-14"])
 def test_tr_does_not_jump_when_td_moves_a_little(parts: str) -> None:
-    """A jump from 49.6 to 82.4 ms, for td 3 ms later, would gain nothing: the mean energy after td hardly changes."""
+    """A jump from 49.6 to 82.4 ms for a td that is 3 ms later would gain nothing, as the mean energy hardly changes."""
     history, grades = read_solved("carT01.gz", parts).history, []
     for td in np.arange(0.141, 0.1502, 0.0015).tolist():
         situation = examine_td(history, td, Settings())
@@ -199,7 +200,7 @@ def test_of_times_alike_the_one_that_leaves_the_body_in_place_is_recommended() -
     ranked_candidates = next(rank_candidates([situation]))
 
     def first(until: float) -> float:
-        """Return the best tr if those before ``until`` displace the body."""
+        """Return the best tr if tr before ``until`` displace the body."""
         out_of_place = np.where(ranked_candidates.judged.moments.tr < until, 1.0, 0.0)
         return next(
             rank_judged(
@@ -377,7 +378,7 @@ def test_rest_is_good_only_in_a_flight_that_is_certain() -> None:
 
 
 def make_crushed_energy(vibration: float) -> np.ndarray:
-    """Return 100 J with little vibration: the level says nothing, and a frozen tr may lose the whole vibration."""
+    """Return 100 J with little vibration, so that a frozen tr at the right level may lose the whole vibration."""
     swinging = sum(np.sin(rate * UNIT + rate) ** 2 for rate in (31.0, 47.0, 66.0)) / 3
     return np.asarray(
         100 * np.minimum(UNIT / 0.1, 1) ** 2
@@ -414,7 +415,7 @@ def test_rest_is_told_from_a_vibration(
 
 
 def test_a_tr_that_is_not_known_to_its_tolerance_is_fair() -> None:
-    """Late in a damped record the level is so low that the misfit of the oscillator moves the crossing far."""
+    """Late in a damped record, the level is so low that the misfit of the oscillator shifts the crossing far."""
     history = read_solved("oscillator_referenceT01.gz").history
     early, late = (
         suggest_in_history(history, td, Settings()) for td in (0.068753, 0.144191)
@@ -444,8 +445,33 @@ def test_a_tr_that_is_not_known_to_its_tolerance_is_fair() -> None:
     assert worst[1] == 46
 
 
+@pytest.mark.parametrize(
+    ("low", "residual", "high", "wanted"),
+    [
+        (0.10, 0.15, 0.19, "good"),
+        (0.19, 0.20, 0.21, "good"),
+        (0.19, 0.21, 0.23, "good"),
+        (0.14, 0.23, 0.29, "good"),
+        (0.21, 0.22, 0.23, "fair"),
+        (0.14, 0.24, 0.31, "fair"),
+        (0.00, 0.15, 0.31, "fair"),
+    ],
+)
+def test_a_pair_is_good_if_it_may_be_and_is_not_much_worse_in_the_worst_case(
+    low: float, residual: float, high: float, wanted: str
+) -> None:
+    answer = suggest_in_history(
+        read_solved("oscillator_referenceT01.gz").history, 0.068753, Settings()
+    )
+    bounds = {"residual_low": low, "residual": residual, "residual_high": high}
+    banded = Candidate(**require(answer.chosen)._asdict() | bounds)
+    quality = grade_pair(answer.situation, banded)
+    assert quality.alone.grade == wanted
+    assert len(quality.alone.causes) == (wanted == "fair")
+
+
 def test_a_flight_that_vibrates_later_was_never_at_rest() -> None:
-    """A structure with many modes is quiet for moments, but free flight excites nothing again."""
+    """A structure with many modes is quiet at some moments, but nothing excites it again in free flight."""
     time = np.linspace(0, 1, 201)
     energy = (
         np.where(time < 0.2, 50 * time, 10.0)

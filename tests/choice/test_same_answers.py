@@ -1,4 +1,4 @@
-"""Answers stay the same: a table of frozen answers, to the digits users read, which faster code must reproduce."""
+"""Answers stay the same: faster code must reproduce a table of frozen answers to the digits that users read."""
 
 from typing import NamedTuple
 
@@ -32,7 +32,7 @@ COMPUTED = {
     "car": ("carT01.gz", Selection(parts=("flying",))),
     "falling box": ("drop2T01.gz", Selection(parts=("flying",))),
 }
-# Frequencies in the record and shares of their energies, and noise [of the highest energy].
+# Frequencies in the record, their energy fractions, and noise [fraction of the highest energy].
 MADE = {
     "one mode": (((4.3, 1.0),), 0.01),
     "two modes": (((3.1, 1.0), (5.7, 0.6)), 0.003),

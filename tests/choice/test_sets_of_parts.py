@@ -97,7 +97,7 @@ def write_variant(folder: Path, *changes: tuple[str, str]) -> str:
 
 
 def rank_sets_of_variant(folder: Path, *changes: tuple[str, str]) -> Parts:
-    """Rank the sets with a changed deck, in a given window so that none is searched."""
+    """Rank the sets with a changed deck in a given window, so that no window is searched for."""
     return rank_sets(MATSUM, write_variant(folder, *changes), times=TIMES)
 
 
@@ -323,7 +323,7 @@ def test_a_deck_whose_parts_have_other_titles_is_doubted(tmp_path: Path) -> None
 
 
 def make_row(part: int, landing: float | None, cost: float | None) -> PartRow:
-    """Return a part with this energy uptake at the beginning of the landing and this share of the cost."""
+    """Return a part with this energy absorption at the beginning of the landing and this fraction of the cost."""
     return PartRow(
         part, "", {"shell": 1}, (), "MAT", "deformable", 1.0, "deck", (), InFlight(True, 1.0, 0.0, 0.5, landing),
         cost, None, None, (),
@@ -345,7 +345,7 @@ def make_row(part: int, landing: float | None, cost: float | None) -> PartRow:
         (
             [make_row(1, -50.0, 0.95), make_row(2, 19.0, 0.05)],
             2,
-        ),  # energy given back by others is not energy taken up
+        ),  # energy that other parts give back is not absorbed energy
         (
             [make_row(1, 0.0, 0.95), make_row(2, 0.0, 0.05)],
             None,
@@ -472,7 +472,7 @@ def list_messages(document: dict[str, Any], code: str) -> list[str]:
 def test_the_car_without_its_wheels_is_recommended_in_its_own_flight(
     folder: Path,
 ) -> None:
-    """All parts fly until the wheels land, and the car flies on: its set saves more than the set of all parts."""
+    """All parts fly until the wheels land, and the car flies on, so its set saves more than the set of all parts."""
     run, deck = d2.read(folder / "MADET01"), folder / "MADE_0000.rad"
     part_table = d2.parts(run, replay=False, deck=deck)
     check_by_schema(part_table.to_dict())

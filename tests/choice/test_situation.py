@@ -1,4 +1,4 @@
-"""A record seen from one td: its contents, the model of its vibration, and what other td do not change."""
+"""A record as seen from one td: its contents, its vibration model, and what does not depend on td."""
 
 from dataclasses import replace
 
@@ -54,7 +54,7 @@ def test_every_model_answers_alike() -> None:
             == (vibration.unknown is not None)
             == (not compared.any())
         )
-        # The tolerance limits the frozen-deformation error, with one mode only if the sign is right.
+        # The tolerance limits the frozen-deformation error; with one mode, only if the sign is right.
         is_useful = (measured["sign_match"] > 0) | (situation.basis == "modal")
         wanted = np.where(is_useful, measured["lock_in_error"], np.inf)[compared]
         np.testing.assert_allclose(vibration.errors(times)[compared], wanted)

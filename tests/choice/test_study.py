@@ -1,4 +1,4 @@
-"""Many runs compared: spread, agreement, one tr for all or the reason against it, and outliers."""
+"""Comparison of many runs: spread, agreement, one tr for all or the reason against it, and outliers."""
 
 import os
 from dataclasses import replace
@@ -149,7 +149,7 @@ def test_one_tr_for_all_verifies_in_each_run_and_so_do_the_ends_of_its_window(
 def test_real_runs_share_a_tr_that_verifies_whatever_the_basis(
     energies: tuple[str, ...], basis: str, td: float, is_kept: bool
 ) -> None:
-    """At the second td more than half of the vibration is lost with any tr: the common one is right, but no use."""
+    """At the second td, every tr loses more than half of the vibration, so the right common tr is of no use."""
     name = locate_stored("chain_ref.csv.gz")
     question = Question(td, Settings(), Selection(energy=energies))
     run_row = judge_run(question, name)
@@ -200,7 +200,7 @@ def test_a_run_given_twice_or_copied_is_called_a_repetition(tmp_path: Path) -> N
 
 
 def test_runs_with_other_content_are_no_repetitions(tmp_path: Path) -> None:
-    """One digit that does not change the answer is enough, even if the files have the same size."""
+    """One digit that does not change the answer is enough to differ, even if the files have the same size."""
     name = variants.write(tmp_path / "run.csv")
     text = Path(name).read_text()
     other = tmp_path / "other.csv"
@@ -357,7 +357,7 @@ def test_the_common_tr_is_the_earliest_within_the_timing_tolerance_of_every_run(
 def test_where_no_time_keeps_the_timing_tolerance_of_all_the_least_loss_counts_and_is_told() -> (
     None
 ):
-    """One error falls from 0.2 to 0, the other grows from 0 to 0.2; the larger one is least in the middle."""
+    """One error falls from 0.2 to 0, the other grows from 0 to 0.2, so the larger one is smallest in the middle."""
     falling, growing = (
         np.array([[1.0, 3.0], [0.2, 0.0]]),
         np.array([[1.0, 3.0], [0.0, 0.2]]),

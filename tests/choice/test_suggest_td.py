@@ -1,4 +1,4 @@
-"""Choice of both times for every basis, the answer if td is missing, and the bound of the search for windows."""
+"""Choice of both times for every basis, the answer if td is missing, and the bound of the window search."""
 
 import csv
 
@@ -124,7 +124,7 @@ def test_what_is_given_up_for_a_higher_level_is_told() -> None:
 
 
 def test_the_reason_against_a_longer_window_is_the_verdict_on_it() -> None:
-    """The residuals of both windows are printed as 0.000; only the longer one may hide a further mode."""
+    """The residuals of both windows are printed as 0.000, but only the longer one may hide a further mode."""
     folder = ROOT / "sample_data/oscillator"
     question = ("--part", "all", "--deck", str(folder / "OSC_0000.rad"))
     history = str(folder / "OSCT01.gz")
@@ -235,7 +235,7 @@ def test_the_means_of_the_computed_rollover_lie_between_the_expected_ones() -> N
 
 
 def test_the_means_of_the_computed_car_are_expected() -> None:
-    """Shells and beams until the landing; for all parts, springs included, 96 % was stated and 89 % computed."""
+    """For shells and beams until the landing; for all parts including springs, 96 % was stated and 89 % computed."""
     history = read_solved("carT01.gz", "1-17").history
     situation = examine_td(history, 0.1464, PLAIN)
     with locate_results("car_runs.csv").open() as table:

@@ -1,4 +1,4 @@
-"""When the parts of a question were rigid, and when only other parts were."""
+"""When the parts of a question were rigid, and when only other parts were rigid."""
 
 from pathlib import Path
 
@@ -20,7 +20,7 @@ def make_column(energy: Samples, kinetic: Samples, title: str) -> matsum.PartCol
 
 @pytest.fixture
 def files(tmp_path: Path) -> list[str]:
-    """Write three bodies: the kinetic energy of the first is a rigid body's for a while, the others are controls."""
+    """Write three bodies: the first has the kinetic energy of a rigid body for a while, the others never have it."""
     is_off = (TIME > 0.299) & (TIME < 0.701)
     swing, moves = 5 + np.sin(40 * TIME), 100 + np.cos(40 * TIME)
     parts = (
@@ -67,5 +67,5 @@ def test_a_window_is_done_only_where_the_parts_of_the_question_were_rigid(
         assert (
             "these parts were rigid: engine; the others deform" in cautions[0].message
         )
-    # If a rigid body has taken over the momenta, those of its parts show no flight.
+    # If a rigid body has taken over the momenta, the momenta of its parts show no flight.
     assert (history.evidence is reference.history.evidence) == (done is None)

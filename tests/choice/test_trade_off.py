@@ -87,7 +87,7 @@ def test_every_td_of_a_sample_is_answered_as_suggest_answers_it(name: str) -> No
 
 
 def test_a_td_without_a_pair_tells_which_of_its_candidates_was_nearest() -> None:
-    """An offer does not keep its candidates: they must be found again."""
+    """An offer does not keep its candidates, so they must be found again."""
     run = read(["sample_data/energy.csv"])
     exploration = explore_run(run, Settings(), (0.001, 0.07), steps=10)
     without = [offer_row for offer_row in exploration.offers if offer_row.pair is None]
@@ -138,7 +138,7 @@ def test_no_td_beats_the_one_that_is_chosen_by_the_level_alone(seed: int) -> Non
 
 
 def test_equal_pairs_do_not_beat_each_other_by_rounding() -> None:
-    """From peak to peak of one oscillator the rigid time is the same, except for its last digits."""
+    """From peak to peak of one oscillator, the rigid time is the same except for its last digits."""
     exploration = explore_run(
         read(["sample_data/energy.csv"]), Settings(), None, steps=20
     )
@@ -200,7 +200,7 @@ def test_candidates_before_the_flight_never_change_what_is_best(
 
 
 def test_the_flight_beside_a_td_is_the_one_that_suggest_names() -> None:
-    """The energy alone shows another flight for each td; the flight of the start of the range must not be shown."""
+    """The energy alone shows a different flight for each td; that of the start of the range must not be shown."""
     time = np.linspace(0.0, 1.0, 2001)
     energy = (
         np.exp(-6 * time) * np.sin(250 * time) ** 2
@@ -265,7 +265,7 @@ def test_no_offer_beats_the_one_that_is_recommended(
 
 @pytest.mark.slow
 def test_a_level_that_stays_the_same_is_graded_alike_at_each_td() -> None:
-    """Plastic energy with a vibration of 1e-4 of it: about half of the vibration is kinetic, on both sides of td."""
+    """Plastic energy with a vibration of 1e-4 of it, about half of which is kinetic on both sides of td."""
     time = np.linspace(0, 1, 2001)
     energy = 1000 + 0.05 * np.sin(400 * time) * np.sin(731 * time)
     exploration = explore_run(

@@ -1,4 +1,4 @@
-"""A pair is refused if its estimate returns more energy than the reference ever has."""
+"""A pair is refused if it is estimated to return more energy than the reference run ever has."""
 
 from dataclasses import replace
 
@@ -20,7 +20,7 @@ from d2rpick.rules.judgement import find_faults
 from tests.energies import make_energy_history, require
 
 TIME = np.linspace(0, 1, 2001)
-# Two modes in flight up to 0.8, then an unreported crash; the mean before td is far below the energy after it.
+# Two modes in flight until 0.8, then an unreported crash; the mean before td is far below the energy after it.
 ENERGY = (2 + np.sin(90 * TIME) + 0.8 * np.sin(173 * TIME)) * np.where(
     TIME > 0.8, 50.0, 1.0
 )

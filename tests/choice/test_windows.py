@@ -1,4 +1,4 @@
-"""Windows of acceptable tr: margins compared with computed landings; times inside verify, times outside do not."""
+"""Windows of acceptable tr, and margins compared with computed landings; verify accepts only times inside windows."""
 
 import csv
 from collections.abc import Iterator
@@ -79,7 +79,7 @@ def make_flying_oscillator(
 def test_the_landing_moves_by_the_amplitude_over_the_speed(
     omega: float, amplitude: float, speed: float, mass: float
 ) -> None:
-    """On average half of the vibration energy is kinetic, so the amplitude counts with a factor of 1/sqrt(2)."""
+    """On average, half of the vibration energy is kinetic, so the amplitude enters with a factor of 1/sqrt(2)."""
     history, flight = make_flying_oscillator(
         omega, amplitude * speed / omega, speed, mass
     )
@@ -145,7 +145,7 @@ def test_a_body_out_of_place_reaches_the_contact_earlier_by_that_over_the_closin
 def test_a_body_that_rises_touches_the_ground_only_by_its_rotation(
     drift: float, speed: float
 ) -> None:
-    """At the contact its centre rises at half of ``speed``; a corner goes down faster than that by the rotation."""
+    """At the contact, its centre rises at half of ``speed``; because of the rotation, a corner goes down faster."""
     history, falling = make_flying_oscillator(10.0, 1e-4 * speed, speed, 2.0)
     (whole,) = history.momenta
     rising = replace(whole, values=whole.values[::-1] * -1.0)
@@ -202,7 +202,7 @@ def test_a_contact_below_a_hundredth_of_the_largest_force_is_a_grazing_one(
     assert (margin.source == "grazing") is grazed
     if (
         grazed
-    ):  # in that time, gravity alone opens a gap of 20 mm, and the vibration another
+    ):  # meanwhile, gravity alone opens a gap of 20 mm, and the vibration another gap
         assert margin.time >= np.sqrt(2 * 0.02 / 9.81)
         assert margin.time == pytest.approx(np.sqrt(2 * 0.02 / 9.81), rel=0.1)
 
@@ -312,7 +312,7 @@ def read_landings(name: str, column: str) -> Iterator[tuple[str, float]]:
 
 
 def test_the_landings_of_the_switched_car_lie_within_the_margin() -> None:
-    """For all runs that were switched in the flight and switched back before the contact."""
+    """This holds for all runs that were switched in the flight and switched back before the contact."""
     history = read_solved("carT01.gz").history
     flight = find_flights(history, Settings())[-1]
     margin = compute_margin(history, flight)
@@ -362,7 +362,7 @@ def find_windows_of(answer: PairSuggestion) -> Samples:
 
 
 def are_in_windows(windows: Samples, times: Samples) -> Samples:
-    """Return for each time if it lies in a window."""
+    """Return, for each time, whether it lies in a window."""
     column_of_times = times[:, np.newaxis]
     return np.asarray(
         np.any(
@@ -385,7 +385,7 @@ def check(answer: PairSuggestion, seed: int) -> None:
     assert all(
         verify_at(situation, t).admissible for t in [*ends.ravel(), *inside.ravel()]
     )
-    # Other times that ``verify`` accepts lie on the cycle of td, where no time outside the tolerance is listed.
+    # Other times that ``verify`` accepts lie in the cycle of td, for which no time outside the tolerance is listed.
     last = max([windows[-1, 1]] if len(windows) else [history.time[0]])
     anywhere = (
         rng.uniform(history.time[0], last, 8) if last > history.time[0] else np.zeros(0)
@@ -397,7 +397,7 @@ def check(answer: PairSuggestion, seed: int) -> None:
     assert [verify_at(situation, t).admissible for t in clear] == are_in_windows(
         windows, clear
     ).tolist()
-    # The errors in the windows are those of ``verify``; there are none if nothing vibrates.
+    # The errors in the windows are those of ``verify``; if nothing vibrates, there are none.
     profile = make_error_profile(situation, answer.candidates, windows)
     for t in inside.ravel()[:4]:
         error = 0.0 if situation.at_rest else verify_at(situation, t).candidate.error

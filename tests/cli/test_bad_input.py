@@ -154,7 +154,7 @@ def test_a_record_without_an_answer_is_an_objection_and_says_why(case: str) -> N
         ]
         in_table = (
             {"no-candidate"} if form == "table" else {}
-        )  # the reason is in the warning
+        )  # the warning gives the reason
         assert messages == [
             warning["code"]
             for warning in suggestion["warnings"]

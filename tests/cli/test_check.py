@@ -770,7 +770,7 @@ def test_findings_are_rows_of_csv_and_markdown_too() -> None:
 def test_every_format_has_the_verdict_on_each_pair_with_reason_and_cure(
     form: str,
 ) -> None:
-    """A pair that is good or fair has no finding, but its reader must learn the verdict too."""
+    """A pair that is good or fair has no finding, but the reader must also see the verdict."""
     judged = [
         run_json("verify", "--tr", repr(window["tr"]), "--td", repr(window["td"]), ENERGY)
         for window in run_json("check", DECK)["windows"]

@@ -1,4 +1,4 @@
-"""Comfort of the command line: settings, versions, completion, near misses, a manual page."""
+"""Comfort of the command line: settings, versions, completion, similar names, and a manual page."""
 
 import json
 import re
@@ -61,7 +61,7 @@ def test_every_command_shows_its_settings(command: str) -> None:
 
 @pytest.mark.parametrize("command", [name for name in COMMANDS if name != "rule"])
 def test_settings_are_shown_without_what_a_run_needs(command: str) -> None:
-    """Whoever asks for the settings of a site has no run at hand."""
+    """Someone who asks for the settings of a site has no run at hand."""
     result = run(command, "--show-settings")
     assert result.exit_code == 0, result.stderr
     assert re.search(r"^[\w-]+ = .+  # default$", result.stdout, re.MULTILINE)
@@ -133,7 +133,7 @@ def test_channels_are_completed_from_the_history_that_was_typed() -> None:
     (offered,) = complete("suggest", GLSTAT, "--energy", "int")
     assert (
         offered == "internal_energy"
-    )  # one word for the shell, but still the name of the channel
+    )  # a single word for the shell, but still the name of the channel
     by_short_name, by_long_name = (
         run_json("suggest", "--td", "0.064", "--energy", name, GLSTAT)
         for name in (offered, "internal energy")
@@ -197,7 +197,7 @@ def test_a_time_in_s_is_not_taken_for_one_in_ms(
 
 
 def test_early_times_that_are_meant_are_kept(in_ms: str) -> None:
-    # A flight, and tr, may begin at once; 1000 times 0.4 is outside the record.
+    # A flight, and tr, may begin at time 0; 1000 times 0.4 lies outside the record.
     for args in (
         ("suggest", "--td", "64", "--after", "0"),
         ("verify", "--tr", "0.0129", "--td", "64"),
@@ -244,7 +244,7 @@ def test_a_pair_may_be_asked_to_be_good(
     result = run(*args, "-q", "-f", "csv", "--min-quality", wanted, ENERGY)
     assert (plain.exit_code, result.exit_code) == (0, code)
     assert result.stdout == plain.stdout
-    if args[0] == "verify" and wanted == "fair":  # the default
+    if args[0] == "verify" and wanted == "fair":  # the default value
         assert run(*args, "-q", ENERGY).exit_code == code
     assert (
         args[0] != "verify"

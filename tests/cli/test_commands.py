@@ -33,7 +33,7 @@ from tests.reading import read_history
 SUGGEST = ("suggest", "--td", "0.064")
 # Commands whose examples compute runs, or plan and compare many.
 SLOW = ("rollover", "reproduce", "plan", "study", "follow", "explore")
-# A page by the level alone takes longer, because it contains the windows of acceptable tr of every td.
+# A page based on the level alone takes longer, because it contains the windows of acceptable tr of every td.
 BY_VIBRATION = dict.fromkeys(("D2RPICK_SUGGEST_NO_VERIFY", "D2RPICK_VERIFY_NO_VERIFY"))
 ROLLING = ("suggest", "--td", "0.37", "--energy", "boxIE_J", ROLLOVER)
 
@@ -53,7 +53,7 @@ def run_program(*args: str, **options: Any) -> CompletedProcess[str]:
     return subprocess.run(command, check=False, **popen_options)
 
 
-# The purpose of the tool.
+# The purpose of the tool: recommendations that hold.
 
 
 @pytest.mark.parametrize(("source", "digits"), [(ENERGY, 1e-10), (GLSTAT, 1e-5)])

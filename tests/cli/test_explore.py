@@ -1,4 +1,4 @@
-"""``explore``: its formats, its schema, and answers that agree with ``suggest`` for every td."""
+"""``explore``: its formats, its schema, and its agreement with ``suggest`` for every td."""
 
 import csv
 import io
@@ -103,7 +103,7 @@ def test_the_step_in_a_long_window_is_the_pair_that_suggest_names(td: str) -> No
 
 
 def test_the_best_pair_of_a_flight_is_not_cured_by_other_times() -> None:
-    """The cure of the pair that suggest and explore choose must not lead back to explore."""
+    """The cure for the pair that suggest and explore choose must not lead back to explore."""
     chosen = ("--part", "1,2", "--no-deck", MATSUM)
     suggestion = run_json("suggest", *chosen)
     assert suggestion["verdict"] == "use with care"

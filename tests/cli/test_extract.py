@@ -29,7 +29,7 @@ from tests.command import (
 from tests.reading import read_history
 
 SUFFIXES = ["csv", "h5", "hdf5"]
-# Equal except for the sign of zeros, which sums lose.
+# Equal except for the sign of zeros, which sums do not keep.
 NUMBERS = st.floats(-1e300, 1e300, allow_nan=False)
 
 BOX = {"csv": (), "h5": (), "glstat": (), "matsum": ("--part", "box")}
@@ -114,7 +114,7 @@ def test_several_parts_have_a_column_each_beside_their_sum(tmp_path: Path) -> No
 
 def test_one_part_needs_no_column_beside_the_energy() -> None:
     source = ROLLOVER_T01
-    # The step flies with the box but was not chosen, so that its energy has a name of its own.
+    # The step flies with the box but was not chosen, so its energy has its own name.
     assert run("extract", "--part", "box", source).stdout.startswith(
         "time,internal_energy,not_chosen_part_2,kinetic_energy,"
     )
@@ -125,7 +125,7 @@ def test_one_part_needs_no_column_beside_the_energy() -> None:
 
 @pytest.fixture(scope="module")
 def box(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
-    """Write the rollover box in every format; return the file names."""
+    """Write the rollover box in every format, and return the file names."""
     folder = tmp_path_factory.mktemp("box")
     files = {suffix: str(folder / f"box.{suffix}") for suffix in BOX}
     for file in files.values():
@@ -198,7 +198,7 @@ def test_what_is_extracted_has_the_flight_and_the_choice_of_its_file(
     "name", ["rollover_box.binout", "rollover_box.glstat", "rolloverT01.gz"]
 )
 def test_what_is_extracted_is_as_healthy_as_its_file(name: str, tmp_path: Path) -> None:
-    """Friction energy stays separate, and the energy ratio is the one that the solver wrote."""
+    """Friction energy stays separate, and the energy ratio is that written by the solver."""
     source, file = str(ROOT / "sample_data" / name), str(tmp_path / "extracted.csv")
     assert (
         run(

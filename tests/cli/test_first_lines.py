@@ -1,4 +1,4 @@
-"""The first lines of the output say what to decide, and by which limit."""
+"""The first lines of the output say what to decide, and on which limit the decision is based."""
 
 import pytest
 

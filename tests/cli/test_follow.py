@@ -51,7 +51,7 @@ def test_a_run_that_flies_exits_with_0(tmp_path: Path) -> None:
     (tmp_path / "carT01").write_bytes(data)
     assert (
         run("follow", "--once", "--wait", "0.005", str(tmp_path)).exit_code == 2
-    )  # half a period is longer
+    )  # half of the period is longer
     rigid = gzip.decompress((ROOT / "tests/data/drop2_w123_T01.gz").read_bytes())
     (tmp_path / "carT01").write_bytes(rigid[: len(rigid) // 2])
     assert run("follow", "--once", str(tmp_path)).exit_code == 0

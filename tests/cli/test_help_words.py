@@ -1,4 +1,4 @@
-"""Help and explanations follow the style guide, as far as a program can tell."""
+"""Help and explanations follow the style guide as far as a program can check this."""
 
 import re
 from collections.abc import Iterator

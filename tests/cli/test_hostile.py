@@ -1,4 +1,4 @@
-"""Closed streams, full disks, interrupts and damaged files: one error line, or the result."""
+"""Closed streams, full disks, interrupts and damaged files give one error line, or the result."""
 
 import gzip
 import io
@@ -111,12 +111,15 @@ def test_an_interrupt_during_the_imports_ends_the_program_without_a_word(
     assert process.returncode == -signal.SIGINT
 
 
-@pytest.mark.parametrize("rest", ["raise SystemExit(0)", "while True: pass"])
+@pytest.mark.parametrize(
+    ("rest", "message"),
+    [("raise SystemExit(0)", b""), ("while True: pass", b"d2rpick: interrupted")],
+)
 def test_an_interrupt_that_a_library_swallows_ends_the_program_all_the_same(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rest: str
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rest: str, message: bytes
 ) -> None:
     """This happens in a finalizer of an object, or while an extension module is imported."""
-    (tmp_path / "click.py").write_text(
+    (tmp_path / "numpy.py").write_text(
         "import os, signal\n"
         "class Swallowing:\n"
         "    def __del__(self):\n"
@@ -126,7 +129,24 @@ def test_an_interrupt_that_a_library_swallows_ends_the_program_all_the_same(
     )
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), str(ROOT)]))
     with start_program("info", ENERGY) as process:
-        assert process.communicate() == (b"", b"")
+        output, errors = process.communicate()
+    assert (output, errors.strip()) == (b"", message)
+    assert process.returncode == -signal.SIGINT
+
+
+def test_an_interrupt_ends_the_program_though_a_thread_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Python waits for all threads at its end, and a thread may wait for a process that has died."""
+    (tmp_path / "numpy.py").write_text(
+        "import os, signal, threading, time\n"
+        "threading.Thread(target=time.sleep, args=(300,)).start()\n"
+        "os.kill(os.getpid(), signal.SIGINT)\n"
+    )
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), str(ROOT)]))
+    with start_program("info", ENERGY) as process:
+        output, errors = process.communicate(timeout=30)
+    assert (output, errors.strip()) == (b"", b"d2rpick: interrupted")
     assert process.returncode == -signal.SIGINT
 
 
@@ -238,7 +258,7 @@ def test_a_full_disk_is_told_of_the_file_that_it_holds(tmp_path: Path) -> None:
 
 
 def test_a_disk_that_fills_up_leaves_the_rows_that_fitted(tmp_path: Path) -> None:
-    """The file size is limited in blocks of 1 kB, which the second row exceeds."""
+    """The file size is limited in blocks of 1 kB, and the second row exceeds the limit."""
     ledger, again = tmp_path / "ledger", tmp_path / "again.csv"
     again.write_bytes(Path(ENERGY).read_bytes())
     assert (
@@ -378,7 +398,7 @@ def test_the_bounds_themselves_are_kept(tmp_path: Path) -> None:
         "deep.h5": make_deep_file(100),
         "still.gz": gzip.compress(
             small + (b"#" * 4095 + b"\n") * (1 << 11)
-        ),  # 1,000 times as many bytes, but still few
+        ),  # 1,000 times as many bytes, which are still few
         "line.csv": small + b"#" * 1_000_000,
     }.items():
         (tmp_path / name).write_bytes(content)
@@ -508,7 +528,7 @@ def test_two_runs_are_not_legs_of_one(tmp_path: Path) -> None:
 
 
 def test_tables_of_different_quantities_are_not_legs_of_one(tmp_path: Path) -> None:
-    """If they have no common column, no state is left, as if the run had written none."""
+    """If the files have no common column, no state is left, as if the run had written none."""
     for name, head in (
         ("one", "time,internal_energy"),
         ("other", "time,force"),

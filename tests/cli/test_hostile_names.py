@@ -63,7 +63,7 @@ CHECKS = ("table", "json", "ndjson", "github", "junit", "sarif")
 
 
 def find_unseen(text: str) -> set[str]:
-    """Return the characters of a text that a terminal does not show, or executes."""
+    """Return the characters of a text that a terminal executes or does not show."""
     return {letter for letter in text if unicodedata.category(letter) in UNSEEN} - {
         "\n"
     }
@@ -89,7 +89,7 @@ def test_a_shell_gives_back_the_words_of_a_command() -> None:
     assert line.isprintable()
     assert not re.search(
         r"(?<!\\)(\\\\)*\\x", line
-    )  # shells disagree on the end of this escape before a digit
+    )  # shells disagree about the end of this escape before a digit
     assert split_by_shell(line) == [os.fsencode(word) for word in words]
 
 
@@ -271,7 +271,7 @@ def test_pages_show_a_name_as_text_and_repeat_it_for_a_shell(
 
 
 def accept_poor(command: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the options that let a command pass with the poor pair of an energy level alone."""
+    """Return the options with which a command passes with the poor pair of an energy level alone."""
     return ("--min-quality", "poor") if command[0] == "verify" else ()
 
 

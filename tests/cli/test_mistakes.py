@@ -1,4 +1,4 @@
-"""Mistakes that users make are answered with what was found, what was expected, and what to do."""
+"""Mistakes of users are answered with what was found, what was expected, and what to do."""
 
 import shutil
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The next step that an answer names can be taken, and messages name only what the user gave."""
+"""The next step named in an answer works, and messages name only what the user gave."""
 
 import re
 import shlex
@@ -24,7 +24,7 @@ DECK = str(SAMPLES / "rollover_box.k")
 
 
 def find_line(name: str, *arguments: str) -> str:
-    """Return the sentence that the table of an answer gives under a name, in one line."""
+    """Return, on one line, the sentence that the table of an answer gives under a name."""
     text = run(*arguments).stdout
     match = re.search(rf"^{name}  .*(?:\n  .*)*", text, re.MULTILINE)
     assert match, text
@@ -318,7 +318,7 @@ def test_a_missing_mass_is_named_and_no_deck_is_asked_for(
     cure = find_line("to improve", *question)
     assert cure.startswith("write the mass")
     assert "--deck" not in cure
-    # The other commands have the same verdict, so that the step leads to a better record rather than round in a circle.
+    # The other commands have the same verdict, so the step leads to a better record instead of back to the answer.
     step = find_line("next", *question)
     assert step.startswith("improve the record")
     assert step.endswith(shlex.join(["suggest", "--td", "369.631", *options, EXCEL]))
@@ -342,7 +342,7 @@ def test_the_step_of_a_plan_without_a_mass_is_not_another_tour() -> None:
     assert "next  improve the record as said above" in text
 
 
-# verify blames what is to blame.
+# verify names the time that is to blame.
 
 
 def test_verify_blames_a_wrong_tr_with_one_error() -> None:

@@ -1,4 +1,4 @@
-"""Destination and form of results: formats, files, figures, colours, exit codes."""
+"""Destination and form of results: formats, files, figures, colours and exit codes."""
 
 import csv
 import hashlib
@@ -502,7 +502,7 @@ class Terminal(io.StringIO):
 
 
 def read_rest(terminal: int) -> bytes:
-    """Read what is left in a terminal that nobody writes to any more."""
+    """Read the remaining content of a terminal to which nobody writes any more."""
     output = b""
     with suppress(OSError):  # Linux reports a closed other end this way
         while piece := os.read(terminal, 1000):
@@ -602,7 +602,7 @@ def test_the_runs_of_a_scan_are_counted_until_it_is_interrupted(quiet: bool) -> 
         os.close(slave)
         terminal_text = b""
         if quiet:
-            time.sleep(2.5)  # other commands have reported progress by now
+            time.sleep(2.5)  # other commands would have reported progress by now
         while not quiet and b" runs" not in terminal_text:
             terminal_text += os.read(master, 1000)
         os.killpg(process.pid, signal.SIGINT)  # like a terminal, to the children too

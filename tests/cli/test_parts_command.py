@@ -243,7 +243,7 @@ def test_what_is_doubtful_in_a_deck_is_said_wherever_it_counts(
 
 
 def test_the_deck_that_a_plan_writes_merges_what_parts_merges(tmp_path: Path) -> None:
-    """Otherwise `check` finds nodes that belong to two rigid bodies (D2R108)."""
+    """Otherwise, `check` finds nodes that belong to two rigid bodies (D2R108)."""
     output = "*DATABASE_MATSUM\n     0.001\n*DATABASE_GLSTAT\n     0.001\n*END"
     deck = put(tmp_path / "main.k", DECK.read_text("utf-8").replace("*END", output))
     result = run(

@@ -1,4 +1,4 @@
-"""Cards printed for 20 run folders, pasted into their decks and checked: no problem is found.
+"""Cards printed for 20 run folders, pasted into their decks and checked, cause no findings.
 
 The parts in each folder have a feature that a card must respect: shared nodes, nodal rigid bodies, joints, included
 files, restarts; in Radioss several bodies, groups and included files.
@@ -46,7 +46,7 @@ def add_cards(*cards: str) -> Callable[[Path], Path]:
 
 
 def move_to_include(folder: Path) -> Path:
-    """Move everything except the title into a file that is included by another one."""
+    """Move everything except the title to a file that is included by another one."""
     main = write_box(folder, write_nodal_body(9, 1, 2))
     put(folder / "mesh.k", main.read_text("utf-8"))
     put(folder / "outer.k", "*KEYWORD\n*INCLUDE\nmesh.k\n*END\n")
@@ -215,7 +215,7 @@ RADIOSS: Mapping[str, Callable[[Path], Path]] = {
 
 
 def write_pieces(folder: Path, main: Path, printed: str) -> None:
-    """Put the printed text where its headings say: into the starter deck, and into engine files."""
+    """Put the printed text in the places that its headings name: in the starter deck, and in engine files."""
     heading = "# ---- "
     for piece in printed.split(heading)[1:]:
         first, _, content = piece.partition("\n")

@@ -18,8 +18,8 @@ from tests.drops import drop, write_run_files
 from tests.json_schemas import check_by_schema, run_json_checked
 
 pytestmark = pytest.mark.slow
-FINE = 4e-4  # time between states [s], fine enough to show a landing that comes slightly later
-# No oscillator describes the run, and none is searched; its flights with vibration are poor, and planned all the same.
+FINE = 4e-4  # output interval [s], short enough to show a landing that occurs slightly later
+# No oscillator describes the run, and none is searched for; its flights with vibration are poor but still planned.
 PART = ("--part", "box", "--no-verify", "--min-quality", "poor")
 
 DECK = """*KEYWORD
@@ -96,7 +96,7 @@ def read_csv_rows(text: str) -> list[dict[str, object]]:
 
 
 def test_a_poor_window_is_called_poor() -> None:
-    """The level may match while most of the vibration is kinetic at td."""
+    """The level may match although most of the vibration is kinetic at td."""
     box = locate_stored("drop2T01.gz")
     plan = d2.plan(d2.read(box), parts="all", min_quality="poor")
     document = plan.to_dict()
@@ -333,7 +333,7 @@ def test_the_cards_of_the_next_run_hold_the_windows_that_are_done(
 def test_a_radioss_run_gets_its_starter_and_a_leg_for_each_switch(
     tmp_path: Path,
 ) -> None:
-    """The first fall of the falling box is free, so the reference can stand in for a run switched there."""
+    """The first fall of the falling box is free, so the reference can replace a run that is switched in it."""
     name, node = "DROP2", "535"
     deck = put(tmp_path / f"{name}_0000.rad", read_starter("DROP2"))
     engine = f"/RUN/{name}/1\n0.7\n/VERS/2022\n/DT\n0.9 0.0\n/RBODY/OFF\n{node}\n/TFILE/4\n0.0002\n"

@@ -329,7 +329,7 @@ def test_a_lead_part_makes_one_body_with_a_deck_and_without(
 def test_a_lead_part_does_not_tell_whether_the_part_hangs_together(
     tmp_path: Path, lead: str, is_known: bool
 ) -> None:
-    """Nor does a lead part outside the parts tell how it moves relative to them."""
+    """A lead part that is not among the parts does not show how it moves relative to them either."""
     merged = (
         "--merge",
         lead,

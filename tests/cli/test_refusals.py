@@ -1,4 +1,4 @@
-"""Refused input gives one line with what was found, what was expected and what to do; no file is written."""
+"""Refused input gives one line with what was found, what was expected and what to do, and no file is written."""
 
 import shlex
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""A run folder is enough input: its main deck is found, named and used, and cards are checked before printing."""
+"""A run folder is sufficient input: its main deck is found, named and used, and cards are checked before printing."""
 
 import re
 import shutil
@@ -20,11 +20,12 @@ NODAL_BODY = (
     "*CONSTRAINED_NODAL_RIGID_BODY\n         9         0         5\n"
 )
 
+SAMPLE_GLSTAT = str(ROOT / "sample_data" / "rollover_box.glstat")
 ENGINE = "/RUN/CAR/1\n0.26\n/VERS/2022\n/DT\n0.9 0.0\n/TFILE/4\n0.0001\n"
 
 
 def write_run_folder(path: Path, extra_keywords: str = DATABASES) -> Path:
-    """Write the sample run with its deck, with other keywords instead of those for the output."""
+    """Write the sample run with its deck, with other keywords in place of those for the output."""
     path.mkdir(exist_ok=True)
     shutil.copy(MATSUM, path / "matsum")
     model = DECK.read_text("utf-8").partition("*DATABASE")[0]
@@ -182,6 +183,32 @@ def test_nodal_rigid_bodies_on_the_parts_are_deleted_while_these_are_rigid(
     ]
     assert flags == [f"{1:10d}{0:10d}", f"{2:10d}{0:10d}"]
     assert "D2R112" not in check_with_card(box, card)
+
+
+@pytest.mark.parametrize(
+    ("constraint", "flags"),
+    [
+        (NODAL_BODY, (1, 0)),
+        ("*CONSTRAINED_SPOTWELD\n         1         2\n", (0, 1)),
+        ("*CONSTRAINED_EXTRA_NODES_NODE\n         3         1\n", (0, 0)),
+    ],
+)
+def test_a_card_needs_only_a_deck_and_parts_if_the_history_has_no_parts(
+    tmp_path: Path, constraint: str, flags: tuple[int, int]
+) -> None:
+    """A glstat names no parts, so the parts of the card are merged, and constraints on them deleted."""
+    box = write_run_folder(tmp_path / "run", DATABASES + constraint)
+    asking = ("card", "--tr", "0.12", "--td", "0.37", "--part", "1,2", "--exit-zero")
+    deck = ("--deck", str(box / "main.k"))
+    result = run(*asking, *deck, "--history", SAMPLE_GLSTAT)
+    assert re.findall(
+        r"^ {9}([12]) +([01]) +PART$", result.stdout, flags=re.MULTILINE
+    ) == [("1", "0"), ("2", "1")]
+    lines = result.stdout.splitlines()
+    first = lines[next(n for n, line in enumerate(lines) if "nrbf" in line) + 1]
+    assert first[:20] == f"{flags[0]:10d}{flags[1]:10d}"
+    assert "D2R108" not in result.stderr
+    assert "D2R112" not in result.stderr
 
 
 def test_of_several_main_decks_one_has_to_be_named(box: Path) -> None:

@@ -1,4 +1,4 @@
-"""Settings files from others start no program, write no file, and never crash a command."""
+"""Settings files from other people start no program, write no file, and never crash a command."""
 
 import os
 import tomllib
@@ -90,7 +90,7 @@ def list_options(command: str) -> list[str]:
 
 
 def ask_with_settings(command: str, text: str) -> str:
-    """Run a command with these settings; return its refusal of one line, which must not be an internal error."""
+    """Run a command with these settings, and return its one-line refusal, which must not be an internal error."""
     put(Path("d2rpick.toml"), text)
     result = run(command, *NEEDED.get(command, ("x",)), "--show-settings")
     assert "internal error" not in result.stderr, text
@@ -203,7 +203,7 @@ def test_a_byte_order_mark_before_the_settings_is_no_part_of_them() -> None:
 
 @pytest.fixture
 def inner(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Work in a folder two levels below the settings file."""
+    """Work in a folder two levels below that of the settings file."""
     folder = tmp_path / "project" / "runs"
     folder.mkdir(parents=True)
     put(tmp_path / "d2rpick.toml", "margin = 0.001\n")
@@ -322,5 +322,5 @@ def test_a_link_to_a_file_of_another_user_is_not_used(inner: Path) -> None:
 
 
 def test_the_values_of_these_tests_are_toml() -> None:
-    """Otherwise the whole file would be refused before its types are checked."""
+    """Otherwise, the whole file would be refused before its types are checked."""
     assert all(tomllib.loads(f"a = {value}") for value in VALUES)

@@ -1,4 +1,4 @@
-"""The command ``study`` for a user: formats, exit codes, lists, and the rows that survive a kill."""
+"""The command ``study`` for a user: formats, exit codes, lists, and rows that survive a killed process."""
 
 import csv
 import gzip
@@ -258,7 +258,7 @@ def test_all_processes_give_the_answer_of_one(runs: list[str]) -> None:
 def test_rows_come_in_order_as_soon_as_they_can(
     runs: list[str], tmp_path: Path
 ) -> None:
-    os.mkfifo(tmp_path / "slow.csv")  # whoever reads it waits
+    os.mkfifo(tmp_path / "slow.csv")  # the reader of the pipe waits
     args = (*STUDY[:-1], "2", "-f", "ndjson", "run1.csv", "slow.csv", "run2.csv")
     with start_program(*args, cwd=tmp_path, text=True) as process:
         assert process.stdout is not None
@@ -289,7 +289,7 @@ def test_a_killed_study_loses_nothing_that_was_finished(
         "--resume",
         str(ledger),
     )
-    os.mkfifo(slow)  # whoever reads it waits
+    os.mkfifo(slow)  # the reader of the pipe waits
     finished = 2 if jobs == "1" else 3
     with start_program(*args, cwd=tmp_path, text=True) as process:
         wait_for(ledger, finished)
@@ -336,7 +336,7 @@ def test_an_interrupted_study_ends_at_once_with_a_line(
 def test_a_run_that_kills_its_process_is_a_row(
     runs: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    # As the system does if memory runs out.
+    # The system does the same if memory runs out.
     (tmp_path / "sitecustomize.py").write_text(
         "import os, d2rpick.choice.runs.study as study\n"
         "judge_run = study.judge_run\n"
@@ -381,7 +381,7 @@ def test_an_unforeseen_error_is_the_row_of_its_run(
 
 
 def count_taken(args: Sequence[str]) -> str:
-    """Return how many runs came from the ledger."""
+    """Return the number of runs that were taken from the ledger."""
     return next(
         (line for line in run(*args).stderr.splitlines() if "reused from" in line), ""
     )
@@ -474,7 +474,7 @@ def test_a_file_in_the_folder_of_a_run_is_never_written_to(
     assert (tmp_path / "glstat").read_bytes() == content_before
 
 
-# The svg grows mostly with the number of curves; from eleven runs on, their number is constant.
+# The svg grows mostly with the number of curves, which is constant from eleven runs on.
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("number", "suffix"), [(3, "png"), (12, "pdf"), (3, "svg"), (12, "svg")]
@@ -533,7 +533,7 @@ def test_the_report_is_one_page_with_all_of_it(runs: list[str], tmp_path: Path) 
 
 
 def test_a_study_of_one_run_gives_the_verdict_of_suggest() -> None:
-    """The error of the pair is above 0.5, but worth little in the next contact."""
+    """The error of the pair exceeds 0.5, but matters little in the next contact."""
     question = (
         "--td",
         "0.37",

@@ -1,4 +1,4 @@
-"""Times as people type them: with the unit behind the number, read in the unit of the run, or refused."""
+"""Times as people type them: with the unit after the number, read in the unit of the run, or refused."""
 
 import json
 from decimal import Decimal
@@ -29,7 +29,7 @@ def written_in(folder: Path, unit: str) -> str:
 
 
 def answered(*words: str) -> dict[str, Any]:
-    """Answer as JSON, without the command that was typed."""
+    """Return the answer as JSON without the command that was typed."""
     document: dict[str, Any] = json.loads(run(*words, "-f", "json").stdout)
     assert document.pop("command")
     return document

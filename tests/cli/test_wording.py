@@ -1,4 +1,4 @@
-"""Each argument named in a library message has an option of the same name."""
+"""Each argument named in a message of the library has an option of the same name."""
 
 import ast
 import re

@@ -1,4 +1,4 @@
-"""Printed switch sets read by the columns of the vendor's keyword data, apart from the reader of the package.
+"""Printed switch sets are read by the columns of the vendor's keyword data, without the reader of the package.
 
 Every field has its place, its type and, where the card says nothing of it, its default; counts and pairs agree.
 """
@@ -22,7 +22,7 @@ FIXED = ("CODE", "TIME2", "TIME3", "ENTNO", "RELSW", "PAIRED", "RWF", "OFFSET")
 
 
 class Column(NamedTuple):
-    """A field: its name, its place from 0, its type, and what a blank means."""
+    """A field: its name, its place (counted from 0), its type, and the meaning of a blank."""
 
     name: str
     place: int
@@ -58,7 +58,7 @@ TO_DEFORMABLE = (Column("PID", 0, int, 0), Column("PTYPE", 1, str, "PART"))
 
 
 class SetRead(NamedTuple):
-    """A switch set: its fields by name, and those of its lines."""
+    """A switch set: its fields and those of its lines, by name."""
 
     fields: dict[str, Any]
     rigid: list[dict[str, Any]]
@@ -66,7 +66,7 @@ class SetRead(NamedTuple):
 
 
 def read_row(line: str, columns: tuple[Column, ...]) -> dict[str, Any]:
-    """Read a line; nothing stands behind its last column, and no field touches the next one."""
+    """Read a line; no text follows its last column, and no field touches the next one."""
     assert not line[len(columns) * WIDTH :].strip()
     found: dict[str, Any] = {}
     for column in columns:
@@ -140,7 +140,7 @@ def test_sets_by_time_have_every_field_in_its_columns(
 
 
 def check_lines(there: SetRead, back: SetRead, printing: Printing) -> None:
-    """Compare the lines with what was asked for, if they name parts and no sets; and NRBF and NCSF."""
+    """Compare the lines with the request if they name parts and no sets; compare NRBF and NCSF as well."""
     deletes = [printing.delete_nodal_bodies, printing.delete_node_sets]
     for one, flag in ((there, 1), (back, 2)):
         flags = [one.fields["NRBF"], one.fields["NCSF"]]

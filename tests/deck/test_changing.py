@@ -37,8 +37,8 @@ TWICE = ONCE.replace(
 )
 
 
-# Sizes of comments added to a deck: a file above 256 KiB stays on disk, a file above 4 MiB is searched by
-# threads and read in pieces.
+# Sizes of comments added to a deck. A file above 256 KiB stays on disk; one above 4 MiB is searched by
+# threads, and read in pieces.
 SIZES = {"small": 0, "big": 300_000, "big, by threads": 5_000_000}
 
 THREADED = (

@@ -1,4 +1,4 @@
-"""Data lines by their columns: what is written is read again, by name, in fixed columns and in free format."""
+"""Data lines by their columns: what is written is read again by name, in fixed columns and in free format."""
 
 from pathlib import Path
 

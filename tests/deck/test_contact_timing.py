@@ -47,7 +47,7 @@ def test_chatter_between_two_windows_is_waited_for() -> None:
     assert flatten_windows(timing.windows) == pytest.approx([0.013, 0.05, 0.073, 0.12])
     with pytest.raises(
         DeckError, match="no force-free time lets a sensor switch"
-    ):  # the short gap from 0.06 to 0.062 stays without a window
+    ):  # the short gap from 0.06 to 0.062 contains no window
         find_sensor_timing([(0.011, 0.05), (0.0705, 0.12)], PUSHES)
 
 

@@ -36,7 +36,7 @@ def test_a_delay_after_the_way_back_keeps_chatter_out() -> None:
 def test_a_delay_after_becoming_rigid_misses_a_contact() -> None:
     late = TO_RIGID._replace(
         delay=0.0105
-    )  # the second contact is over when the set may switch back
+    )  # the second contact has ended when the set may switch back
     assert follow_pair(
         late, BACK, [(0.0, 0.01), (0.02, 0.0203), (0.05, 0.06)], 0.1
     ) == [(0.01, 0.05), (0.06, None)]

@@ -1,4 +1,4 @@
-"""Masses, stable time steps and positions of parts, compared with values by hand; watched nodes of a run."""
+"""Masses, stable time steps and positions of parts, compared with manual results; watched nodes of a run."""
 
 import math
 from dataclasses import replace
@@ -207,7 +207,7 @@ def test_nodes_of_nodout_are_watched(tmp_path: Path, keyword: str, ids: str) -> 
 def test_nodes_written_in_local_axes_show_no_rotation_of_their_part(
     tmp_path: Path,
 ) -> None:
-    """LS-DYNA writes them in the coordinate system of the card, Radioss in a skew system; both may turn."""
+    """LS-DYNA writes them in the coordinate system of the card, Radioss in a skew system; both may rotate."""
     cards = f"*DATABASE_HISTORY_NODE\n{make_row(2, 3, width=10)}"
     local = f"*DATABASE_HISTORY_NODE_LOCAL\n{make_row(3, 5, 1, width=10)}"
     text = f"{dyna.HEAD}*NODE\n{dyna.write_nodes()}{PLATE}{cards}"

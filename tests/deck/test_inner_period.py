@@ -65,7 +65,7 @@ def test_the_longest_of_several_counts_and_light_pieces_do_not(tmp_path: Path) -
 
 
 def test_springs_at_an_angle_make_a_bracket(tmp_path: Path) -> None:
-    """Two springs k at an angle: k (1 + cos) where they are stiffest, 2 k is what no direction has more of."""
+    """Two springs k at an angle have k (1 + cos) in their stiffest direction; no direction has more than 2 k."""
     side, stiffness = 2.0, 1e5
     mass = DENSITY * side**3
     periods = find_period(

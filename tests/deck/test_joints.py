@@ -1,4 +1,4 @@
-"""Joints of parts that share no nodes, in every form that d2rpick reads, and notes on those that it cannot read."""
+"""Joints of parts that share no nodes, in every form that d2rpick reads, and notes on forms that it cannot read."""
 
 from pathlib import Path
 
@@ -11,7 +11,7 @@ from tests.deck import test_radioss_inventory as rad
 from tests.deck.test_ls_dyna_inventory import read_text, write_nodes
 from tests.decks import make_row, pad
 
-# Parts 7, 9 and 11, a shell each, without a node in common: 1 to 4, 5 to 8, 9 to 12.
+# Parts 7, 9 and 11 are one shell each and have no common nodes: 1 to 4, 5 to 8, 9 to 12.
 MESH = (
     "*KEYWORD\n"
     + "".join(f"*PART\np{part}\n{part:10d}         1         1\n" for part in (7, 9, 11))

@@ -1,4 +1,4 @@
-"""Gravity, supports and imposed motion of decks, and which parts they hold.
+"""Gravity, supports and prescribed motions of decks, and the parts that they hold.
 
 The mesh is that of the made car: six parts that share nodes 1 to 12, in three rows along y, and two wheels of nodes 21
 to 26 and 31 to 36.
@@ -47,7 +47,7 @@ def read_ls_dyna(folder: Path, further_cards: str) -> Inventory:
 
 
 def find_held_parts(inventory: Inventory) -> tuple[set[int], bool]:
-    """Return the parts that are held, and True if the model is held."""
+    """Return the parts that are held, and True if the whole model is held."""
     by_part, whole = find_supports(inventory)
     return set(by_part), bool(whole)
 
@@ -183,7 +183,7 @@ def write_gravity(
 
 
 def find_surroundings(inventory: Inventory) -> Surroundings:
-    """Return the surroundings that a deck defines, for a run without other information."""
+    """Return the surroundings that a deck defines for a run without other information."""
     return add_surroundings(OpenedRun((), ()), inventory).surroundings
 
 

@@ -1,4 +1,4 @@
-"""Elements of LS-DYNA decks, against an independent count."""
+"""Elements of LS-DYNA decks, compared with an independent count."""
 
 from collections import Counter
 from collections.abc import Sequence

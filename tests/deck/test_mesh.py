@@ -11,7 +11,7 @@ IDS = st.lists(st.integers(1, 30), max_size=12)
 
 @pytest.mark.parametrize(
     "far", [0, 10**8]
-)  # from this id on a table of all ids would be too large
+)  # from this id on, a table of all ids would be too large
 @given(IDS, IDS, IDS)
 def test_places_are_those_of_the_ids(
     far: int, placed: list[int], used: list[int], asked: list[int]

@@ -1,4 +1,4 @@
-"""Rigid bodies that parts form: connected by springs, by a rigid body of the deck, or by nothing."""
+"""Rigid bodies that parts form: connected by springs, by a rigid body of the deck, or not at all."""
 
 from pathlib import Path
 
@@ -15,14 +15,14 @@ from tests.deck.test_joints import MESH
 from tests.deck.test_ls_dyna_inventory import read_text
 from tests.decks import make_row, pad
 
-# Part 1 is a row of shells on the nodes 1 to 40, parts 2 and 3 are one shell each: 41 to 44, 45 to 48.
+# Part 1 is a row of shells with the nodes 1 to 40; parts 2 and 3 are one shell each: 41 to 44, 45 to 48.
 ROW = "".join(pad(n, 2 * n - 1, 2 * n, 2 * n + 2, 2 * n + 1) for n in range(1, 20))
 RADIOSS = (
     "".join(f"/PART/{n}\np{n}\n{pad(1, 1)}" for n in (1, 2, 3))
     + f"/SHELL/1\n{ROW}/SHELL/2\n{pad(31, 41, 42, 44, 43)}/SHELL/3\n{pad(32, 45, 46, 48, 47)}"
 )
 SPRING = f"/PART/9\nmount\n{pad(2, 1)}/SPRING/9\n"
-# The same for the three shells of LS-DYNA, on the nodes 1 to 12.
+# The same for the three shells of LS-DYNA, with the nodes 1 to 12.
 DISCRETE = (
     f"*PART\nmount\n{pad(15, 2)}*SECTION_DISCRETE\n{pad(2)}\n\n*ELEMENT_DISCRETE\n"
 )
@@ -45,7 +45,7 @@ def write_body(number: int, *nodes: int) -> str:
 
 
 def test_a_small_part_beside_a_big_one_is_a_body_of_its_own(tmp_path: Path) -> None:
-    """Earlier, loose wheels were merged with a car that had three quarters of the nodes."""
+    """In an earlier version, loose wheels were merged with a car that had 75 % of the nodes."""
     assert read_radioss(tmp_path).bodies([1, 2, 3]) == ((1,), (2,), (3,))
 
 
@@ -80,7 +80,7 @@ def test_a_rigid_body_that_is_there_to_be_switched_says_which_parts_become_one(
     assert inventory.bodies([2, 3]) == (
         (2,),
         (3,),
-    )  # it contains another part too, so it cannot switch these
+    )  # it contains another part as well, so it cannot switch these parts
     assert inventory.groups([1, 2, 3]) == ((1,), (2,), (3,))
     assert inventory.joined == {}
 
@@ -132,7 +132,7 @@ def test_a_rigid_body_that_is_always_on_with_a_group_that_is_not_followed_is_a_t
 
 
 def test_parts_of_a_body_may_lie_in_pieces_that_nothing_joins(tmp_path: Path) -> None:
-    """Four parts of a car are one body, hubs and tyres two wheels."""
+    """Four parts of a car form one body, and hubs and tyres form two wheels."""
     for deck, whole in (
         (made_car.write_starter(tmp_path), True),
         (made_car.write_keywords(tmp_path), False),

@@ -1,4 +1,4 @@
-"""Printed engine files run with the real solver to the end, and the parts are rigid in the windows.
+"""Printed engine files run to the end with the real solver, and the parts are rigid in the windows.
 
 These tests run only if OPENRADIOSS_PATH names an installation of OpenRadioss, and take some seconds.
 """
@@ -61,7 +61,7 @@ def write_starter() -> str:
 
 
 def run_solver(folder: Path, name: str) -> None:
-    """Run the starter and all engine files; the test is skipped where there is no solver."""
+    """Run the starter and all engine files; the test is skipped if there is no solver."""
     home = os.environ.get("OPENRADIOSS_PATH")
     if not home:
         pytest.skip(
@@ -148,7 +148,7 @@ def test_printed_legs_run_to_the_end_and_are_rigid_in_their_windows(
 
 
 def test_sensors_switch_in_one_run_as_legs_do(tmp_path: Path) -> None:
-    """Before tr all states equal those of the reference run bit by bit; in the windows nothing deforms."""
+    """Before tr, all states equal those of the reference run bit by bit; in the windows, nothing deforms."""
     windows, reference = [(0.003, 0.006), (0.009, 0.014)], tmp_path / "reference"
     reference.mkdir()
     (reference / "strip_0000.rad").write_text(write_starter())
@@ -193,7 +193,7 @@ def test_sensors_switch_in_one_run_as_legs_do(tmp_path: Path) -> None:
 
 
 def test_a_first_run_switches_itself_at_the_same_step_twice(tmp_path: Path) -> None:
-    """The strip flies 20 mm to a wall, at 5 m/s: rigid after the wait, and released by the force of the wall."""
+    """The strip flies 20 mm to a wall at 5 m/s; it is rigid after the wait, and released by the force of the wall."""
     head, _, body_lines = write_starter().partition("/RBODY/1")
     reals = [
         pad(*row, width=WIDE)

@@ -152,7 +152,7 @@ def test_a_file_of_windows() -> None:
 
 
 def test_windows_are_read_from_the_journal_of_a_driven_run() -> None:
-    """A leg replaces one with the same number: of a probe that went too far, or of a skipped flight."""
+    """A leg replaces a leg with the same number, for example a probe that went too far or a skipped flight."""
     legs = [("load", 1, 0.0, 0.06), ("probe", 2, 0.06, 0.1), ("probe", 3, 0.1, 0.2), ("rigid", 3, 0.1, 0.145),
             ("load", 4, 0.145, 0.16), ("probe", 5, 0.16, 0.17), ("load", 5, 0.16, 0.2), ("probe", 6, 0.2, 0.3),
             ("probe", 7, 0.3, 0.32), ("load", 7, 0.3, 0.4), ("load", 8, 0.4, 0.5)]  # fmt: skip

@@ -1,4 +1,4 @@
-"""Random decks: the reader returns what was written, and no bytes make the check fail."""
+"""Random decks: the reader returns what was written, and no bytes crash the check."""
 
 import contextlib
 import string

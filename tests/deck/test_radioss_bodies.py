@@ -1,4 +1,4 @@
-"""Rigid bodies that a deck lacks: their parts, their main node, and the velocities and gravity on it."""
+"""Rigid bodies that a deck lacks: their parts, their main node, and its velocity and gravity."""
 
 from pathlib import Path
 
@@ -154,7 +154,7 @@ def test_the_main_node_lies_at_the_centre_of_mass(tmp_path: Path) -> None:
 
 
 def test_what_moves_and_pulls_the_parts_acts_on_the_main_nodes(tmp_path: Path) -> None:
-    """Otherwise the starter sets the bodies to rest (D2R407), and gravity does not act on them."""
+    """Otherwise, the starter sets the bodies to rest (D2R407), and gravity does not act on them."""
     everything = write_group(
         1, *(10 * part + i for part in (1, 2, 3) for i in range(4))
     )
@@ -208,7 +208,7 @@ def test_a_body_that_the_deck_has_is_taken(tmp_path: Path) -> None:
 def test_a_body_that_is_never_rigid_gives_its_nodes_to_the_new_one(
     tmp_path: Path, held: tuple[int, ...]
 ) -> None:
-    """A set of parts can be written whatever bodies the deck has for other sets, if its run never puts these on."""
+    """A set of parts can be written whatever bodies the deck has for other sets, if the run never activates these."""
     main = write_run(
         tmp_path / "deck",
         write_group(70, *held, kind="PART") + BODY,

@@ -1,4 +1,4 @@
-"""Flaws of rigid bodies, compared with numbers that OpenRadioss (bd4557ba7) gave for these decks.
+"""Flaws of rigid bodies, compared with results of OpenRadioss (bd4557ba7) for these decks.
 
 The decks are the strip of four shells of `tests.deck.test_openradioss`: nodes 1 to 10, 0.1 apart, and main node 99.
 """
@@ -174,7 +174,7 @@ def write_spin(group: int) -> str:
 
 
 @pytest.mark.parametrize(
-    ("text", "moves"),  # whether the kinetic energy at the start was above 0 in OpenRadioss
+    ("text", "moves"),  # whether the kinetic energy at the start exceeded 0 in OpenRadioss
     [
         (write_velocity(1), False), (write_velocity(7) + ALL, True), (write_velocity(98) + MAINS, True),
          (write_velocity(2), False),
@@ -233,7 +233,7 @@ def test_a_body_that_an_engine_file_lets_rest_is_found(
 def test_a_velocity_of_the_first_leg_stands_for_that_of_the_starter(
     tmp_path: Path,
 ) -> None:
-    """/INIV moves the nodes of a body that is off, whatever velocity the starter gave them."""
+    """/INIV moves the nodes of an inactive body, whatever velocity the starter gave them."""
     assert find_run_flaws(tmp_path, write_velocity(1), OFF + write_start(1, 10)) == ()
 
 

@@ -55,7 +55,7 @@ def write_run(
     starter: str = EXAMPLE.deck,
     legs: tuple[tuple[str, str], ...] | None = None,
 ) -> str:
-    """Write a run; ``legs`` are the end of each and its further lines."""
+    """Write a run; ``legs`` are the end and the further lines of each leg."""
     if legs is None:
         return write(folder, starter, EXAMPLE.files, EXAMPLE.name)
     files = {

@@ -26,7 +26,7 @@ BOTH = f"/GRNOD/PART/9\nboth\n{pad(1, 2)}"
 
 
 class Listed(NamedTuple):
-    """A run: its starter cards besides three plates, the cards of its legs, and when each part is rigid."""
+    """A run: its starter cards in addition to three plates, the cards of its legs, and when each part is rigid."""
 
     starter: str
     legs: tuple[str, ...]
@@ -274,7 +274,7 @@ RIGID_PARTS = {
 
 
 def write_run(folder: Path, run: Listed) -> str:
-    """Write a run of legs of 2 ms each, or of one of 6 ms."""
+    """Write a run of three legs of 2 ms each, or of one leg of 6 ms."""
     end = f"/TH/PART/1\nparts\nDEF\n{pad(1, 2, 3)}/END\n"
     main = folder / "X_0000.rad"
     main.write_text(
@@ -318,7 +318,7 @@ def read_events(folder: Path) -> Iterator[tuple[int, bool, float]]:
 
 
 def find_spans_by_listing(folder: Path) -> dict[int, list[tuple[float, float]]]:
-    """Return the rigid spans by part without those of a few cycles; an activation first means rigid before."""
+    """Return the rigid spans by part without those of a few cycles; a first activation means rigid before."""
     rigid_spans: dict[int, list[tuple[float, float]]] = {}
     for part, rigid, now in read_events(folder):
         spans = rigid_spans.setdefault(part, [])
@@ -415,7 +415,7 @@ def test_a_body_that_nothing_switches_makes_its_parts_rigid(tmp_path: Path) -> N
 
 
 def test_main_nodes_of_rigid_parts_follow_the_order_of_the_deck(tmp_path: Path) -> None:
-    """Nodes 101 to 103 are the last of the deck; the body of an /RBODY comes before those of parts."""
+    """Nodes 101 to 103 are the last nodes of the deck; the body of an /RBODY precedes those of parts."""
     legs = (OFF + "104 105 106", ON + "105", OFF + "105")
     parts = {1: write_rigid_part(), 3: write_rigid_part()}
     main = Path(write_run(tmp_path, Listed(write_body(9, 0, 2), legs, {}, 2612, parts)))

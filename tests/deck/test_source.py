@@ -1,4 +1,4 @@
-"""Places of keywords are the same in memory and on disk, for any size of pieces and any number of threads."""
+"""The places of keywords are the same in memory and on disk, for any size of pieces and number of threads."""
 
 from __future__ import annotations
 
@@ -169,7 +169,7 @@ def test_where_no_more_threads_are_allowed_one_searches_all(
 
 
 class Short(HeldInMemory):
-    """Bytes for which only the main thread gets memory."""
+    """Bytes for which only the main thread can allocate memory."""
 
     @contextmanager
     def opened(self) -> Iterator[Filling]:

@@ -1,4 +1,4 @@
-"""Parts whose material flows through the mesh, or whose law keeps a reference: `parts`, `plan` and `check` say so."""
+"""Parts whose material flows through the mesh or keeps a reference state are named by `parts`, `plan` and `check`."""
 
 from pathlib import Path
 

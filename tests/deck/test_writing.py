@@ -177,7 +177,7 @@ def test_a_run_gets_the_legs_with_its_own_keywords(tmp_path: Path) -> None:
 def test_legs_are_named_after_the_files_of_the_run_by_which_the_engine_finds_its_restart(
     tmp_path: Path,
 ) -> None:
-    """Source: runs computed with OpenRadioss, whose engine looks for NAME_0001.rst beside NAME_0002.rad."""
+    """Source: runs computed with OpenRadioss, whose engine looks for NAME_0001.rst next to NAME_0002.rad."""
     main = write_radioss_run(tmp_path / "ref")
     for file in (tmp_path / "ref").iterdir():
         file.rename(file.with_name(file.name.replace("box_", "heavy_box_")))
@@ -200,7 +200,7 @@ def test_legs_are_named_after_the_files_of_the_run_by_which_the_engine_finds_its
 def test_a_run_of_several_legs_alike_is_cut_anew_at_the_switches(
     tmp_path: Path,
 ) -> None:
-    """A later leg may lack keywords of the first one, such as initial velocities, but has none of its own."""
+    """A later leg may lack keywords of the first leg, such as initial velocities, but has no others."""
     card = print_cards(
         WINDOWS, Printing(node=(1808,), end=0.8, name="box", solver="radioss")
     )
@@ -225,12 +225,12 @@ def test_a_run_of_several_legs_alike_is_cut_anew_at_the_switches(
 
 
 def test_bodies_that_the_run_keeps_off_stay_off_in_every_leg(tmp_path: Path) -> None:
-    """Otherwise they would be rigid from time 0, like the wheels of a car of which only the body is switched."""
+    """Otherwise, they would be rigid from time 0, like the wheels of a car of which only the body is switched."""
     engine = ENGINE.replace("1808\n", "1808 1809\n1810\n") + "/END\nleft over\n"
     for starter_deck, name in (
         ((), "a"),
         ((1810, 1809), "b"),
-    ):  # a card that knows them, and one that does not
+    ):  # a card with these bodies, and one without them
         card = print_cards(
             WINDOWS,
             Printing(
@@ -287,7 +287,7 @@ def test_all_windows_fit_one_engine_run_by_sensors(
     text = Path(engine).read_text()
     assert (
         "/RBODY/OFF\n1809\n" in text
-    )  # bodies that the run keeps off; one with a sensor has no leg
+    )  # bodies that the run keeps inactive; a body with a sensor has no leg
     assert (
         text.count("/DTIX\n5e-05 5e-05\n") == text.count("/DTIX") == 1
     )  # of the shortest window

@@ -1,6 +1,6 @@
-"""A tumbling box whose parts lie on a line: its motion follows from written nodes, else from the kinetic energy."""
+"""A tumbling box whose parts lie on a line: its motion follows from written nodes or from the kinetic energy."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 from types import SimpleNamespace
 from typing import cast
@@ -30,7 +30,7 @@ from tests.flight.test_position_error import vectors
 
 TIME = np.linspace(0.0, 0.12, 601)
 START, END = 0.02, 0.12
-# Bottom, walls, lid and a block in the box, whose centres lie on a line [kg, m].
+# Bottom, walls, lid, and a block in the box; their centres lie on a line [kg, m].
 MASSES = np.array([6.8, 18.3, 4.7, 27.6])
 ALONG = np.array([0.1157, 0.0472, 0.1295])
 CENTRES = np.outer([-1.0, 0.0, 1.0, 0.2], ALONG) + np.array([0.0, 0.0, 0.6])
@@ -45,7 +45,7 @@ FALL = np.array([0.3, -0.2, -2.0])
 
 
 def slide_block(times: Samples) -> Samples:
-    """Return the places (n, parts, 3) in the box while the block swings by 6 mm along the line, about their centre."""
+    """Return the places (n, parts, 3) in the box, about their centre, while the block swings by 6 mm along the line."""
     swing = 0.006 * np.sin(230.0 * times)
     inside = np.repeat(CENTRES[np.newaxis], times.size, axis=0)
     inside[:, BLOCK] += np.outer(swing, ALONG / np.linalg.norm(ALONG))
@@ -95,7 +95,7 @@ def make_box(momentum: Samples) -> Box:
     fall = np.outer(TIME, FALL) + np.outer(TIME**2, [0.0, 0.0, -9.81 / 2])
     middle = np.average(CENTRES, axis=0, weights=MASSES)
     parts = np.einsum("nij,npj->npi", frames, inside) + (fall + middle)[:, np.newaxis]
-    # The box is displaced against the centre of mass as its bottom is.
+    # The box is displaced relative to the centre of mass as its bottom is.
     arms = CORNERS - CENTRES[0] + inside[:, :1]
     corners = np.einsum("nij,npj->npi", frames, arms) + (fall + middle)[:, np.newaxis]
     return Box(frames=frames, parts=parts, corners=corners, momentum=momentum)
@@ -142,6 +142,15 @@ def find_drift_of_box(
         moved = box.corners[:, columns] - CORNERS[columns]
         return NodeMotion(TIME[states], written, moved[states]) if written else None
 
+    return find_drift_with_nodes(box, read_displacements, first)
+
+
+def find_drift_with_nodes(
+    box: Box,
+    read_displacements: Callable[[Sequence[int]], NodeMotion | None],
+    first: int = 0,
+) -> Drift | None:
+    """Return the drift in a record that begins with state ``first`` and whose nodes are read by a function."""
     flying = Flying(make_momenta_of_box(box, first), MASSES, range(4), START, END)
     return find_drift(flying, make_deck(), read_displacements)
 
@@ -160,7 +169,7 @@ def test_three_nodes_beside_a_line_show_how_a_box_turns_and_two_do_not() -> None
 
 
 def test_nodes_show_how_a_box_turns_if_they_are_written_throughout_the_flight() -> None:
-    """They have their own output interval, and their file may begin later or end earlier."""
+    """The nodes have their own output interval, and their file may begin later or end earlier."""
     last = int(np.searchsorted(TIME, END))
     first = int(np.searchsorted(TIME, START))
     every = get_turning(find_drift_of_box(BOX))
@@ -182,7 +191,7 @@ def test_nodes_at_other_places_than_in_the_deck_show_no_frame() -> None:
 def test_the_front_moves_as_the_corner_that_is_lowest(
     first: int, momentum: Samples
 ) -> None:
-    """Against the centre of mass, in the last tenth of the flight; also in a record that begins in the flight."""
+    """Relative to the centre of mass, in the last 10 % of the flight; also in a record that begins in the flight."""
     box = make_box(12.0 * momentum)
     turning = get_turning(find_drift_of_box(box, first=first))
     centre = np.einsum("p,npi->ni", MASSES / MASSES.sum(), box.parts)
@@ -201,7 +210,7 @@ def test_the_front_moves_as_the_corner_that_is_lowest(
 def test_a_box_that_was_rigid_is_turned_and_out_of_place_as_computed(
     first: int, tr: float
 ) -> None:
-    """The block, half of the mass, swings by 6 mm: 3 mm and about 0.05 degrees."""
+    """The block has half of the mass and swings by 6 mm, which displaces the box by 3 mm and about 0.05 degrees."""
     start = int(np.searchsorted(TIME, tr))
     inside = slide_block(TIME)
     inertia = compute_inertia_of_box(np.repeat(inside[start : start + 1], 601, axis=0))

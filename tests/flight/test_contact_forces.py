@@ -1,4 +1,4 @@
-"""Flights found by the forces of contacts and rigid walls, alone if momenta are missing."""
+"""Flights found from contact and rigid-wall forces, which are the only evidence if momenta are missing."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def test_a_gap_between_two_pushes_is_too_short_for_a_flight() -> None:
 
 
 def test_what_always_or_never_acts_says_nothing_of_a_flight() -> None:
-    """A tied contact holds parts together; a contact without a force may be that of other parts."""
+    """A tied contact holds parts together; a contact without a force may belong to other parts."""
     tied, idle = make_contact((0.0, 1.0), name="tied"), make_contact(name="idle")
     assert find_flight_around(0.5, tied, idle) is None
     flight = require(
@@ -236,7 +236,7 @@ def make_pushed_momenta(*forces: ContactForce, velocity: bool = False) -> Moment
 def test_contacts_of_a_body_with_itself_do_not_end_its_flight(
     velocity: bool, side: int
 ) -> None:
-    """Such contacts are written with the force of one side, although no external force acts."""
+    """Such contacts are written with the force on one side, although no external force acts."""
     ground, inner = (
         make_contact((0.0, 0.2), (0.8, 0.9)),
         make_contact((0.1, 0.6), name="with itself"),

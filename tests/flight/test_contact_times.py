@@ -20,7 +20,7 @@ def make_bouncing_part(
     interval: float,
     gravity: float = GRAVITY,
 ) -> Momenta:
-    """Return the momentum of a part that a constant force turns back in each contact; no state is at its ends."""
+    """Return the momentum of a part that a constant force turns back in each contact, without a state at its ends."""
     time = np.arange(0.0, end + interval / 2, interval)
     impulses = [
         40.0 * MASS * (0.05 + 0.02 * contact_number)
@@ -52,7 +52,7 @@ def make_bouncing_part(
 def test_every_contact_is_seen_within_half_an_interval(
     shift: float, length: float
 ) -> None:
-    """A contact inside one interval is placed in its middle third: the error is at most 2/3 of an interval."""
+    """A contact inside one interval is placed in its middle third, with an error of at most 2/3 of an interval."""
     interval = 1e-3
     sliver = 0.01 * interval  # a push shorter than this in one interval is invisible
     contacts = [

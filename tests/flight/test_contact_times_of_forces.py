@@ -1,4 +1,4 @@
-"""Contact times from forces and impulses at states: exact to half an interval."""
+"""Contact times from forces and impulses at states, which are exact to half an interval."""
 
 import numpy as np
 import pytest

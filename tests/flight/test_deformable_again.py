@@ -1,4 +1,4 @@
-"""Parts of a switched run in its flights: of a computed box that was rigid in three windows."""
+"""Parts of a switched run in its flights, for a computed box that was rigid in three windows."""
 
 from functools import cache
 
@@ -17,7 +17,7 @@ from d2rpick.histories.names import Selection
 from tests.computed import locate_stored
 from tests.energies import require
 
-# Of the parts of the box, beside the ground of 314 kg.
+# Masses of the parts of the box, in addition to the ground of 314 kg.
 BOX_MASS = 58.7
 
 

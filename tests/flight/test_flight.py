@@ -1,4 +1,4 @@
-"""The end of the load, found by the oscillator that describes the later energy, or by the energy alone."""
+"""The end of the load, found from the oscillator that describes the later energy or from the energy alone."""
 
 import math
 from collections.abc import Callable
@@ -27,7 +27,7 @@ PERIOD = 2 * np.pi / paper.OMEGA_2
 def integrate_oscillator(
     force: Callable[[float], float], end: float, *, alpha: float
 ) -> History:
-    """Return the paper's oscillator, from rest, under a force on its frame; one state each 0.1 ms."""
+    """Return the paper's oscillator, from rest, under a force on its frame, with one state each 0.1 ms."""
 
     def equations_of_motion(t: float, u: np.ndarray) -> list[float]:
         z, y, vz, vy = u
@@ -299,5 +299,5 @@ def test_a_level_that_has_sunk_into_noise_recommends_nothing_but_a_td_where_it_h
         )
         < 1e-4
     )
-    # With 1 % noise a peak is not exact: the middle of the range left by the noise.
+    # With 1 % noise, a peak is not exact; it is in the middle of the range that the noise leaves.
     assert 0 < require(require(answer.better_pair).residual) < 1e-3

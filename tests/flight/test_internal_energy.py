@@ -208,7 +208,7 @@ def test_a_constant_force_is_gravity_only_if_it_is_as_large(
 def test_a_velocity_of_the_model_shows_no_gravity_but_that_of_earth(
     acceleration: float, falling: bool
 ) -> None:
-    """Kinetic energy follows any constant force (friction, other planets), so only the acceleration decides."""
+    """The kinetic energy follows any constant force (friction, other planets), so only the acceleration decides."""
     assert not find_flights(
         make_accelerated_model(acceleration if falling else -acceleration), PLAIN
     )
@@ -286,7 +286,7 @@ def test_a_motion_that_has_ended_is_no_flight() -> None:
 def test_a_wall_that_does_no_work_is_no_flight_however_constant_the_energies_are() -> (
     None
 ):
-    """The body springs back from 0.2 to 0.8: internal becomes kinetic energy, and their sum is constant."""
+    """The body springs back from 0.2 to 0.8: internal energy becomes kinetic energy, and their sum is constant."""
     pushed = 500 * np.clip((TIME - 0.2) / 0.6, 0, 1) ** 2
     ringing = 3 * np.sin(300 * TIME) ** 2
     history = make_energy_table(900 - pushed + ringing, 100 + pushed - ringing)
@@ -299,7 +299,7 @@ def test_a_wall_that_does_no_work_is_no_flight_however_constant_the_energies_are
 
 @pytest.mark.parametrize("spring_share", [0.0, 40.0])
 def test_a_spring_to_ground_does_not_fly(spring_share: float) -> None:
-    """All of its kinetic energy is vibration; a flying body keeps some when the deformation turns."""
+    """All of its kinetic energy is vibration energy; a flying body keeps some when its deformation reverses."""
     internal = 100 * np.sin(60 * TIME) ** 2
     history = make_energy_table(
         internal, 100 - internal + spring_share - 10 * np.maximum(0.05 - TIME, 0)
@@ -356,7 +356,7 @@ def test_a_vibration_that_swings_only_a_few_times_keeps_its_level_and_a_crash_do
 def test_a_few_swings_keep_their_level_in_a_fall_although_gravity_feeds_the_sum(
     phase: float,
 ) -> None:
-    """The sum of energies grows by far more than the vibration has; its work of gravity is no loss by damping."""
+    """The sum of energies grows by far more than the vibration has; the work of gravity is not a loss by damping."""
     swings = 5 * np.sin(8 * TIME + phase) ** 2
     falling = 1000 + 400 * TIME**2
     sums = np.stack([falling, falling - 400 * TIME**2])
@@ -364,7 +364,7 @@ def test_a_few_swings_keep_their_level_in_a_fall_although_gravity_feeds_the_sum(
 
 
 def test_a_few_swings_show_no_flight_while_a_load_of_unknown_size_works() -> None:
-    """A steady push makes a body swing about one level, too."""
+    """A steady push also makes a body swing about one level."""
     swings = 5 * np.sin(8 * TIME + 0.8) ** 2
     pushed = 1000 + 400 * TIME[np.newaxis] ** 2
     assert find_settled_time(TIME, swings, pushed, 0.0, 1.0) == 0.0
@@ -415,7 +415,7 @@ def test_a_couple_drives_the_body_for_a_while_and_it_flies_before_and_after(
 def test_a_flight_in_which_energies_ring_about_their_law_is_found_and_uncertain() -> (
     None
 ):
-    """Internal damping dissipates energy in steps, which no parabola describes."""
+    """Internal damping dissipates energy in steps, which a parabola does not describe."""
     rung = 100 * np.sin(60 * TIME) ** 2
     pushed = np.minimum(TIME / 0.2, 1) ** 2
     lost = 0.5 * (TIME - np.sin(240 * TIME) / 240) * (TIME > 0.2)
@@ -439,8 +439,8 @@ def test_a_flight_in_which_energies_ring_about_their_law_is_found_and_uncertain(
     ("internal", "kinetic"),
     [
         (1 + 0.001 * np.sin(300 * TIME) ** 2, 50 + 20 * TIME + 30 * TIME**2),
-        # more energy is lost than the vibration has: a stiff body that a constant force slows down rings as one
-        # oscillator, and it pushes a weak vibration on
+        # More energy is lost than the vibration has.
+        # A stiff body slowed down by a constant force rings as one oscillator, with a weak vibration.
         (1e-6 * np.sin(300 * TIME) ** 2, 50 - 10 * TIME + 2 * TIME**2),
     ],
 )
@@ -454,7 +454,7 @@ def test_a_load_that_energies_cannot_tell_from_gravity_makes_a_pair_poor(
 
 
 def test_a_momentum_that_stays_while_a_load_works_is_prescribed() -> None:
-    """A couple winds the body up, then it stands still: a support that held its momentum may still hold it."""
+    """A couple winds the body up, and then it stands still: a support that held its momentum may still hold it."""
     wound = np.minimum(TIME / 0.4, 1.0) ** 2
     values = np.full((TIME.size, 1, 3), 2.5)
     values[0] = 0.0
@@ -463,7 +463,7 @@ def test_a_momentum_that_stays_while_a_load_works_is_prescribed() -> None:
     assert not find_flights(
         make_table(TIME, 8e3 * wound, whole, balance=energies), PLAIN
     )
-    stored = np.exp(-(((TIME - 0.2) / 0.05) ** 2))  # stored by a contact for a while
+    stored = np.exp(-(((TIME - 0.2) / 0.05) ** 2))  # stored by a contact for some time
     fallen = replace(energies, kinetic=8e3 * (1.5 - wound - 0.2 * stored))
     (flight,) = find_flights(
         make_table(TIME, 8e3 * wound, whole, balance=fallen), PLAIN
@@ -510,7 +510,7 @@ def test_an_oscillator_makes_no_flight_certain_in_which_the_body_loses_energy(
     lost: float,
 ) -> None:
     """Drag slows the body down while its spring vibrates on as one oscillator."""
-    decay = np.exp(-0.2 * TIME)  # internal damping, which the energies show too
+    decay = np.exp(-0.2 * TIME)  # internal damping, which the energies also show
     ringing, moving = 20 * decay * np.cos(60 * TIME) ** 2, 60 * (1 - lost * TIME)
     internal = 20 * decay - ringing
     flight = suggest_in_history(

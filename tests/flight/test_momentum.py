@@ -1,4 +1,4 @@
-"""Flights found by momentum, for motions of known pieces and for runs computed by a solver."""
+"""Flights found from momenta, for motions in known pieces and for runs computed by a solver."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -133,7 +133,7 @@ def list_trip_pieces(start: float = 0.08, end: float = 0.33) -> list[Piece]:
 
 
 def list_pulse_pieces(begin: float, end: float, force: float) -> list[Piece]:
-    """Return a force in x and z that changes four times and ends; a constant one could not be told from gravity."""
+    """Return a force in x and z that changes four times and ends; a constant force would look like gravity."""
     levels = np.array([1.0, 2.0, 1.5, 0.7])
     times = np.linspace(begin, end, 5)
     return [
@@ -206,7 +206,7 @@ def test_the_flight_of_two_bodies_is_found_to_a_few_states_whatever_they_exchang
     )  # fmt: skip
     flight = require(find_flight_around(momenta, td))
     assert flight.parts == PARTS[:2]
-    # In these times the forces change the momentum by 0.2 % of its range.
+    # In these times, the forces change the momentum by 0.2 % of its range.
     load, contact = 5e-3 * start, 5e-4
     tolerance = 3 * END / (states - 1)
     assert flight.start == pytest.approx(start, abs=tolerance + load)
@@ -286,7 +286,7 @@ def test_attached_parts_are_found_among_many() -> None:
 
 
 def test_a_part_of_next_to_no_mass_is_not_put_in_and_out_for_ever() -> None:
-    """Rounding decides if such a part makes a sum smaller."""
+    """Rounding decides whether such a part makes a sum smaller."""
     for seed in range(100):
         rests = np.random.default_rng(seed).normal(size=(3, 150)) * [
             [1.0],

@@ -1,4 +1,4 @@
-"""Position error at td: of rotating bodies, of bodies without evidence, and of computed runs."""
+"""Position error at td for rotating bodies, for bodies without evidence, and for computed runs."""
 
 import csv
 from functools import cache
@@ -46,7 +46,7 @@ SPAN = np.linspace(0.0, 1.0, 11)
 
 
 def rotate_about(rate: Samples, angle: Samples) -> Samples:
-    """Return rotation matrices, (n, 3, 3), about ``rate`` by ``angle`` times its length (Rodrigues)."""
+    """Return rotation matrices, (n, 3, 3), about ``rate`` by ``angle`` times the length of ``rate`` (Rodrigues)."""
     size = np.linalg.norm(rate)
     x, y, z = rate / size if size > 0 else rate
     across = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
@@ -90,7 +90,7 @@ def find_drift_of_body(momenta_of_body: Momenta, masses: Samples = MASSES) -> Dr
 def test_a_body_that_turns_is_off_by_the_mass_share_of_what_slides_in_it(
     turn: Samples, path: Samples, start: float
 ) -> None:
-    """Within 10 % of the largest: the part of a slide along a circle cannot be told from the arm of the part."""
+    """Within 10 % of the largest: the part of a slide along a circle cannot be distinguished from the part's arm."""
     slides = make_slides(0.02 * path)
     drift_found = find_drift_of_body(make_momenta(6.0 * turn, slides))
     first, last = (
@@ -159,7 +159,7 @@ def test_beyond_the_flight_nothing_is_known() -> None:
 @pytest.mark.parametrize(
     ("masses", "members"),
     [
-        (MASSES, (0, 4)),  # a rotation cannot be told from two parts
+        (MASSES, (0, 4)),  # a rotation cannot be determined from two parts
         (np.where(np.arange(5) == 1, np.nan, MASSES), range(5)),  # a mass is unknown
         (
             np.array([0.01, 0.01, 0.01, 500.0, 300.0]),
@@ -194,7 +194,7 @@ def test_parts_that_are_no_body_at_all_tell_nothing() -> None:
 def test_a_swing_of_less_than_a_period_makes_the_error_a_lower_bound(
     periods: float, turn: Samples, phase: float
 ) -> None:
-    """Most of the slide looks like rotation, so the error is too small, down to 10 %."""
+    """Most of the slide looks like rotation, so the error is up to 10 % too small."""
     slides = np.zeros((TIME.size, *PLACES.shape))
     slides[:, ENGINE] = np.outer(
         np.sin(2 * np.pi * periods * TIME / TIME[-1] + phase), (0.004, 0.012, 0.016)
@@ -239,7 +239,7 @@ def compute_errors(
 
 @pytest.mark.slow
 def test_the_car_is_as_far_off_as_computed() -> None:
-    """All switched runs in flight: centre of 12 nodes of the body, within 30 % or 1 mm, for errors of 1 to 7.5 mm."""
+    """For all switched runs in flight: centre of 12 body nodes, within 30 % or 1 mm, for errors of 1 to 7.5 mm."""
     with locate_results("car_runs.csv").open() as table:
         rows = [
             scan_row
@@ -386,7 +386,7 @@ def test_the_limit_is_that_of_the_bodies_whose_parts_move() -> None:
     assert Bodies([still], make_rigid_bodies((3,))).limit == np.inf
 
 
-# Bodies of the car.
+# Bodies that the parts of the car become.
 
 
 @cache
@@ -396,7 +396,7 @@ def read_car(parts: str) -> tuple[History, Flight]:
 
 
 def test_heavy_parts_each_for_itself_stay_where_they_should_as_computed() -> None:
-    """Six bodies: computed, the car is 0.16 mm off; as one body it would be 1.8 mm."""
+    """As six bodies, the car is displaced by 0.16 mm according to the solver; as one body, it would be 1.8 mm."""
     with locate_results("car_runs.csv").open() as table:
         (run,) = [row for row in csv.DictReader(table) if row["run"] == "car_b_heavy"]
     tr, td = np.array([float(run["tr_s"])]), float(run["td_s"])

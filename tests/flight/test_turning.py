@@ -1,4 +1,4 @@
-"""Rotation error of a body that is rigid for a while, compared with a motion integrated step by step."""
+"""Rotation error of a body that is rigid for some time, compared with a motion integrated step by step."""
 
 import csv
 from collections.abc import Callable, Collection
@@ -101,7 +101,7 @@ def find_drift_and_turn(
 def test_angle_and_place_are_those_of_the_two_motions(
     momentum: Samples, path: Samples, tr: float
 ) -> None:
-    """Within 2 % of the largest of the flight; the engine slides 2 cm and the body rotates up to 30 degrees."""
+    """Within 2 % of the largest in the flight; the engine slides by 2 cm and the body rotates by up to 30 degrees."""
     full, td = 900.0 * momentum, 0.095
     start = int(np.searchsorted(TIME, tr))
 
@@ -196,7 +196,7 @@ def test_a_deck_with_the_parts_in_other_places_or_without_one_tells_no_angle() -
 def test_the_speed_at_the_front_is_that_of_the_node_that_is_farthest_along(
     direction: tuple[float, float, float],
 ) -> None:
-    """Against the centre of mass, in the last tenth of the flight from 0.01 to 0.1 s; the engine hardly slides."""
+    """Relative to the centre of mass, in the last 10 % of the flight from 0.01 to 0.1 s; the engine hardly slides."""
     where = make_body_with_sliding_engine(0.001)
     centre = np.einsum("p,npi->ni", MASSES / MASSES.sum(), where)
     ways = (where - centre[:, np.newaxis])[:, :ENGINE] @ np.array(direction)
@@ -212,7 +212,7 @@ def test_the_speed_at_the_front_is_that_of_the_node_that_is_farthest_along(
 
 
 def test_what_flies_with_a_body_holds_it() -> None:
-    """The frame is displaced by the mass share in everything that flies, not in the parts that become rigid."""
+    """The frame is displaced by the mass fraction in everything that flies, not in the parts that become rigid."""
     slides = np.zeros((TIME.size, *PLACES.shape))
     slides[:, ENGINE, 0] = 0.5 * TIME
     inside = PLACES + slides
@@ -246,7 +246,7 @@ def test_a_body_that_bends_more_than_it_is_said_to_turn_makes_the_angle_a_lower_
 def test_every_switched_run_of_the_car_is_as_far_off_and_turned_as_computed(
     tmp_path: Path,
 ) -> None:
-    """Centre and orientation of 12 nodes of the body: within 30 % or 1 mm, and 30 % or 0.1 degrees."""
+    """Centre and orientation of 12 body nodes, within 30 % or 1 mm, and 30 % or 0.1 degrees."""
     deck = put(tmp_path / "CAR_0000.rad", read_starter("CAR"))
     where = Placement(read_inventory(str(deck)))
     with locate_results("car_runs.csv").open() as table:

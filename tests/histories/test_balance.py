@@ -1,4 +1,4 @@
-"""Energy of springs and dampers: found if energies add up, left out of the level unless it is the only energy."""
+"""Energy of springs and dampers: found if energies add up, and left out of the level unless it is the only energy."""
 
 from dataclasses import dataclass, field
 
@@ -62,7 +62,7 @@ def test_where_nothing_adds_up_no_part_is_taken_for_a_spring() -> None:
     )  # more than the energy of all parts
     assert (
         find_spring_ids(Made(ENERGIES[:, 0], format="csv")) == ()
-    )  # in a table the name may mean something else
+    )  # in a table, the name may mean something else
     twins = ENERGIES[:, [0, 0, 2, 3]]
     assert find_spring_ids(Made(twins[:, 0], whole=twins.sum(axis=1)), twins) in (
         (),

@@ -1,4 +1,4 @@
-"""The bytes of files that are appended to, cut, replaced or written anew while they are read."""
+"""The bytes of files that are appended to, cut, replaced or rewritten while they are read."""
 
 import hashlib
 import os

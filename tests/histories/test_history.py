@@ -1,4 +1,4 @@
-"""What a history refuses; energies at many times are those at each time alone."""
+"""Histories that are refused; energies at many times equal those at each single time."""
 
 import pickle
 

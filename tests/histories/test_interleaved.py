@@ -1,4 +1,4 @@
-"""Tables with a row for each time and part: refused in any order, while coarsely printed times are not."""
+"""Tables with a row for each time and part are refused in any order; coarsely printed times are not."""
 
 import numpy as np
 import pytest

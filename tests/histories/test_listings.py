@@ -85,7 +85,7 @@ def find_wrong_listings(
         (
             listing(tag=FIX),
             "commit 2b7ab50b7",
-        ),  # the first fix, which had an error of its own
+        ),  # the first correction, which had its own error
         (listing(ran="2026/01/12"), "run on 2026-01-12"),
         (listing(ran="2026/01/13"), ""),
         (listing(tag=AFTER), ""),
@@ -96,7 +96,7 @@ def find_wrong_listings(
                 "OpenRadioss", "Radioss"
             ),
             "",
-        ),  # other programs: nothing is known of this error
+        ),  # other programs, for which nothing is known about this error
         (
             listing("1986-2025 Altair Engineering, Inc.").replace(
                 "SET ON", "LOCAL SKEW"

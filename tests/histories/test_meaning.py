@@ -1,4 +1,4 @@
-"""Quantities by their names: spellings of solvers, postprocessors and users, in tables and in HDF5."""
+"""Quantities by name: spellings of solvers, postprocessors and users, in tables and in HDF5."""
 
 from collections.abc import Callable
 

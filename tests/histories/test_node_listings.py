@@ -1,4 +1,4 @@
-"""Nodes whose motion LS-DYNA lists in its ASCII database nodout, beside the file with the energies."""
+"""Nodes whose motion LS-DYNA lists in its ASCII database nodout, next to the file with the energies."""
 
 from __future__ import annotations
 
@@ -9,8 +9,6 @@ import numpy as np
 import pytest
 
 from d2rpick.base.errors import FormatError
-from d2rpick.flight.position_error import find_drift
-from d2rpick.flight.turning import Flying
 from d2rpick.histories.node_listings import read_listed_nodes, recognises
 from d2rpick.histories.opening import open_run
 from d2rpick.histories.source import Source
@@ -19,13 +17,10 @@ from tests.flight.test_body_frame import (
     BOX,
     CORNER_IDS,
     CORNERS,
-    END,
-    MASSES,
-    START,
     TIME as BOX_TIME,
     find_drift_of_box,
-    make_deck,
-    make_momenta_of_box,
+    find_drift_with_nodes,
+    get_turning,
 )
 
 if TYPE_CHECKING:
@@ -141,10 +136,8 @@ def test_the_frame_of_a_body_by_nodout_is_that_by_the_nodes_of_radioss() -> None
     def read_displacements(ids: Sequence[int]) -> NodeMotion | None:
         return read_listed_nodes([Source("nodout", content)], ids)
 
-    flying = Flying(make_momenta_of_box(BOX), MASSES, range(4), START, END)
-    of_nodout = require(find_drift(flying, make_deck(), read_displacements))
-    turning = require(of_nodout.turning)
-    expected = require(require(find_drift_of_box(BOX)).turning)
+    turning = get_turning(find_drift_with_nodes(BOX, read_displacements))
+    expected = get_turning(find_drift_of_box(BOX))
     size = np.abs(expected.place).max()
     np.testing.assert_allclose(turning.place, expected.place, atol=2e-3 * size)
     np.testing.assert_allclose(turning.frame, expected.frame, atol=1e-3)

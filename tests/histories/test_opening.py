@@ -1,4 +1,4 @@
-"""Formats are recognised by content; the sources of bytes; the errors of both."""
+"""Formats are recognised by content; sources of bytes; errors of both."""
 
 import gzip
 import io
@@ -266,7 +266,7 @@ def test_a_file_beside_the_histories_is_named_for_what_it_is(
     with pytest.raises(FormatError, match=reason) as error:
         read_history([file(data, Path(name).name)])
     assert "\n" not in str(error.value)
-    assert "; " in str(error.value)  # the way out
+    assert "; " in str(error.value)  # the remedy
 
 
 def test_a_matsum_is_told_by_its_parts_behind_any_legend(file: Write) -> None:

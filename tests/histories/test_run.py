@@ -1,4 +1,4 @@
-"""Several files as one run: families, legs, companions; which energy of them is used."""
+"""Several files as one run: families, legs, companion files, and which of their energies is used."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def open_companions(
 
 
 def test_the_files_of_one_folder_are_a_family_and_those_of_several_are_legs() -> None:
-    """Branches are in files of different MPI ranks, one continues in %001; the restart has its own folder."""
+    """Branches are in files of different MPI ranks, and one continues in %001; the restart has its own folder."""
     whole, parts = made_binout(range(1, 6)), made_binout(range(1, 6), glstat=False)
     globals_only = bytes(whole.data).replace(b"matsum", b"nodout")
     files = {
@@ -142,7 +142,7 @@ def test_legs_are_ordered_by_their_start_and_the_newer_one_wins() -> None:
 
 
 def test_a_leg_that_gives_no_state_is_named() -> None:
-    """Two files that start at the same time are hardly legs of one run."""
+    """Two files that start at the same time are probably not legs of one run."""
     history = read_contents(
         glstat, make_glstat_text([1, 2], [1, 2]), make_glstat_text([1, 2], [3, 4])
     )
@@ -257,7 +257,7 @@ def test_parts_with_more_energy_than_the_model_are_of_another_run(
 
 
 def test_round_off_of_a_free_fall_is_no_energy_of_another_run() -> None:
-    """A falling box has some 1e-18 J in its parts, and another 1e-18 J as a whole."""
+    """A falling box has some 1e-18 J in its parts, and a different 1e-18 J as a whole."""
     table = b"time,internal_energy,kinetic_energy\n1,1e-18,5\n2,0,6\n3,0,7\n"
     run = open_companions(
         {
@@ -376,7 +376,7 @@ def test_a_time_column_is_no_choice_where_there_is_one_only(tmp_path: Path) -> N
 
 
 def test_what_is_in_the_files_is_told_where_no_energy_can_be_chosen() -> None:
-    """A file without states, and curves of which none is meant."""
+    """A file without states, and curves none of which is the required one."""
     empty = describe_run(open_contents(glstat, HEAD), Selection())
     assert (empty.states, empty.time_start, empty.sampling, empty.notes) == (
         0,

@@ -12,6 +12,7 @@ from d2rpick.histories.samples import (
     find_crossings,
     find_first_above,
     find_turns,
+    halve_brackets,
     narrow_brackets,
 )
 
@@ -51,7 +52,7 @@ def test_conventions(name: str) -> None:
 
 
 def walk(energy: list[int], level: int) -> list[tuple[Fraction, bool]]:
-    """Crossings by a walk in rational arithmetic: the same conventions, another way."""
+    """Crossings by a walk in rational arithmetic: the same conventions with another method."""
     passages: list[tuple[Fraction, bool]] = []
     side, arrived = 0, Fraction(0)
     for i, value in enumerate(energy):
@@ -154,13 +155,14 @@ def test_of_each_stretch_the_extremes_stay(states: int, seed: int) -> None:
         } <= {*time.astype(int).tolist()}
 
 
-@pytest.mark.parametrize("with_slope", [False, True])
 @given(ROOTS)
-def test_every_bracket_narrows_on_its_root(with_slope: bool, roots: np.ndarray) -> None:
+def test_every_bracket_narrows_on_its_root(roots: np.ndarray) -> None:
     narrowed = narrow_brackets(
-        lambda t: roots**3 - t**3, np.zeros(roots.size), np.ones(roots.size),
-        slope=(lambda t: -3 * t**2) if with_slope else None, steps=64,
-    )  # fmt: skip
+        lambda t: (roots**3 - t**3, -3 * t**2),
+        np.zeros(roots.size),
+        np.ones(roots.size),
+        steps=64,
+    )
     np.testing.assert_allclose(narrowed.at, roots, rtol=1e-12)
     assert np.all(narrowed.within <= narrowed.at)
     assert np.all(narrowed.at <= narrowed.beyond)
@@ -168,15 +170,39 @@ def test_every_bracket_narrows_on_its_root(with_slope: bool, roots: np.ndarray) 
 
 @given(ROOTS)
 def test_what_is_within_stays_within_either_way_round(roots: np.ndarray) -> None:
-    upwards = narrow_brackets(
-        lambda t: t < roots, np.zeros(roots.size), np.ones(roots.size)
+    upwards = halve_brackets(
+        lambda t: t < roots, np.zeros(roots.size), np.ones(roots.size), 64
     )
-    downwards = narrow_brackets(
-        lambda t: t >= roots, np.ones(roots.size), np.zeros(roots.size)
+    downwards = halve_brackets(
+        lambda t: t >= roots, np.ones(roots.size), np.zeros(roots.size), 64
     )
-    assert np.all(upwards.within < roots)
-    assert np.all(downwards.within >= roots)
-    np.testing.assert_allclose(upwards.within, downwards.within, atol=1e-12)
+    assert np.all(upwards < roots)
+    assert np.all(downwards >= roots)
+    np.testing.assert_allclose(upwards, roots, rtol=1e-12)
+    np.testing.assert_allclose(upwards, downwards, atol=1e-12)
+
+
+@given(st.integers(1, 3), st.integers(1, 23), st.integers(0, 999))
+def test_halvings_tested_together_find_what_single_ones_find(
+    copies: int, halvings: int, seed: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    within = np.tile(rng.normal(size=(20, 2)), (copies, 1))  # 120 ends are many
+    beyond = within + rng.normal(size=within.shape)
+
+    def passes(time: np.ndarray) -> np.ndarray:
+        return np.asarray(np.sin(40 * time) > np.cos(3 * time))
+
+    expected, other = within, beyond
+    for _ in range(halvings):
+        middle = (expected + other) / 2
+        is_within = passes(middle)
+        expected, other = (
+            np.where(is_within, middle, expected),
+            np.where(is_within, other, middle),
+        )
+    found = halve_brackets(passes, within, beyond, halvings)
+    np.testing.assert_array_equal(found, expected)
 
 
 @given(ROOTS)
@@ -188,9 +214,7 @@ def test_a_root_is_the_same_to_the_last_digit_alone_and_beside_others(
         return [
             *map(
                 float,
-                narrow_brackets(
-                    lambda t: some**3 - t**3, *ends, slope=lambda t: -3 * t**2
-                ).at,
+                narrow_brackets(lambda t: (some**3 - t**3, -3 * t**2), *ends).at,
             )
         ]
 

@@ -1,4 +1,4 @@
-"""Where the bytes come from: files, folders, globs, gzip and standard input, for all formats."""
+"""Sources of the bytes: files, folders, globs, gzip and standard input, for all formats."""
 
 import gzip
 import hashlib
@@ -108,7 +108,7 @@ def test_files_of_one_run_are_not_mixed_with_those_of_the_next(
     for name in (first, here / "next"):
         name.write_bytes(whole)
     os.mkfifo(second)
-    time.sleep(0.02)  # above the resolution of the file's times
+    time.sleep(0.02)  # more than the resolution of the file's times
 
     def write_the_second() -> None:
         with second.open(

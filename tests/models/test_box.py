@@ -1,4 +1,4 @@
-"""The rollover box: the laws of mechanics, what switching keeps, and the times of the published study."""
+"""The rollover box: the laws of mechanics, what switching preserves, and the times of the published study."""
 
 from functools import cache
 

@@ -1,4 +1,4 @@
-"""The recommendations for twenty-one structures of many modes, compared with a scan over tr."""
+"""The recommendations for 21 structures with many modes, compared with a scan over tr."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -34,13 +34,13 @@ def test_the_recommended_tr_rolls_right_and_brings_the_energy_back_that_is_annou
             make_history(rehearsal.reference), rehearsal.td, Settings()
         ).recommended
     )
-    # where the printed digits of a matsum leave its start open by a millisecond, another crossing may come first
+    # if the printed digits of a matsum leave its start uncertain by 1 ms, another crossing may come first
     released = require(rehearsal.reference.released)
     assert min(pair.tr, require(rehearsal.tr)) >= released - INTERVAL
 
 
 def test_a_run_and_its_matsum_have_one_answer(tmp_path: Path) -> None:
-    """The step vibrates together with the box; both answers have to know it."""
+    """The step vibrates together with the box, which both answers have to take into account."""
     record = simulate(Parameters(mesh=MESH), 0.42, interval=INTERVAL)
     matsum = tmp_path / "matsum"
     matsum.write_bytes(BOX_WRITERS["matsum"](record))

@@ -1,4 +1,4 @@
-"""Pictures of decisions: what another td costs, how much is saved, when to stop, how often to write."""
+"""Pictures of decisions: the cost of another td, the saving, when to stop, and how often to write."""
 
 from __future__ import annotations
 
@@ -131,7 +131,7 @@ def landings() -> Figure:
 
 
 def worth() -> Figure:
-    """Draw what a vibration error is worth at the next contact."""
+    """Draw how much a vibration error matters at the next contact."""
     figure, (axes,) = make_figure(3.0)
     share = np.logspace(-4, -0.4, 60)
     for factor, name, color in (

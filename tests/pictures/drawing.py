@@ -1,4 +1,4 @@
-"""What all pictures share: size, colours, curves with few points, labels and files."""
+"""Properties that all pictures share: size, colours, curves with few points, labels and files."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ RIGID: Final = "#7fb685"
 FLIGHT: Final = "#dbe9f6"
 MUTED: Final = "#8a8f98"
 WIDTH: Final = 7.5  # [inches]
-POINTS: Final = 500  # most points of a curve; a screen shows no more
+POINTS: Final = 500  # largest number of points of a curve; a screen shows no more
 # Text stays text, so that a file is small and can be searched.
 STYLE: Final[Any] = {
     "svg.fonttype": "none",
@@ -54,7 +54,7 @@ def draw_curve(
     label: str = "",
     style: str = "-",
 ) -> None:
-    """Draw a curve by at most ``POINTS`` points, evenly chosen."""
+    """Draw a curve with at most ``POINTS`` points, evenly spaced."""
     across, up = np.asarray(x, float), np.asarray(y, float)
     chosen = np.unique(np.linspace(0, across.size - 1, POINTS).astype(int))
     axes.plot(
@@ -98,7 +98,7 @@ def mark_time(axes: Axes, time: float, label: str, height: float = 0.5) -> None:
 
 
 def name_axes(axes: Axes, across: str, up: str) -> None:
-    """Write what the axes show, with units."""
+    """Label the axes, with units."""
     axes.set_xlabel(across)
     axes.set_ylabel(up)
 
@@ -109,7 +109,7 @@ def show_names(axes: Axes, location: Any = "best") -> None:
 
 
 def drawn(figure: Figure, name: str) -> bytes:
-    """Draw a figure as the svg file with this name."""
+    """Write a figure as the svg file with this name."""
     with mpl.rc_context(STYLE):
         return without_trailing_blanks(render(figure, f"{name}.svg"))
 
@@ -121,6 +121,6 @@ def write_figure(figure: Figure, name: str) -> None:
 
 
 def without_trailing_blanks(content: bytes) -> bytes:
-    """Take the blanks off the ends of lines, which matplotlib writes into paths."""
+    """Remove the spaces at the ends of lines, which matplotlib writes into paths."""
     lines: Iterable[bytes] = content.split(b"\n")
     return b"\n".join(line.rstrip() for line in lines)

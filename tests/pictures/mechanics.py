@@ -89,7 +89,7 @@ def level() -> Figure:
 
 
 def sign() -> Figure:
-    """Draw what comes back after td from the same level: in the right and in the wrong direction."""
+    """Draw what returns after td from the same level, in the right and in the wrong direction."""
     figure, (axes,) = make_figure(3.2)
     draw_curve(
         axes,
@@ -166,7 +166,7 @@ def residual() -> Figure:
 
 
 def out_of_place() -> Figure:
-    """Draw a body whose engine moves on its mounts in flight, and where the body is if both are frozen."""
+    """Draw a body whose engine moves on its mounts in flight, and the position of the body if both are frozen."""
     figure, (axes,) = make_figure(3.0)
     time = np.linspace(0, 100, 400)
     share, swing = (

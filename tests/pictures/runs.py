@@ -1,4 +1,4 @@
-"""The runs that the pictures show: each is computed once, by the command that the documentation shows."""
+"""The runs that the pictures show; each is computed once, with the command in the documentation."""
 
 from __future__ import annotations
 
@@ -21,25 +21,25 @@ OSCILLATOR = "replay --stiffness 660e3 --mass 31.4 --beta 2 --alpha 50 --v0 6 --
 
 @cache
 def computed(command: str) -> pd.DataFrame:
-    """Compute a run by a command of d2rpick, and give its table with the time as index."""
+    """Compute a run with a command of d2rpick, and return its table with the time as index."""
     printed = run(*shlex.split(command)).stdout
     return pd.read_csv(io.StringIO(printed)).set_index("time")
 
 
 def fall(*windows: tuple[float, float]) -> pd.DataFrame:
-    """Give the falling box of the tutorial, rigid together with its step in these windows."""
+    """Return the falling box of the tutorial, which is rigid together with its step in these windows."""
     times = "".join(f" --tr {tr} --td {td}" for tr, td in windows)
     return computed(FALL + times + (" --with-step" if windows else ""))
 
 
 def oscillator(tr: float | None = None, td: float | None = None) -> pd.DataFrame:
-    """Give the oscillator of the samples, rigid from tr to td."""
+    """Return the oscillator of the samples, rigid from tr to td."""
     times = "" if tr is None else f" --tr {tr} --td {td}"
     return computed(OSCILLATOR + times)
 
 
 def deformation(table: pd.DataFrame) -> pd.Series[float]:
-    """Give the stretch of the oscillator's spring [mm]."""
+    """Return the elongation of the oscillator's spring [mm]."""
     return (table["z"] - table["y"]) * 1e3
 
 

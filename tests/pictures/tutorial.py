@@ -1,4 +1,4 @@
-"""Pictures of the tutorial and of the way of working: a box that falls, bounces and is switched."""
+"""Pictures of the tutorial and of the workflow: a box that falls, bounces and is switched."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Files of others, which solvers really wrote: no part of the project, and all other tests do without them.
+"""Files from other people, written by real solvers; they are not part of the project, and other tests do not need them.
 
 This is the only place that knows where they lie: D2RPICK_REAL names the folder, else it is ``../shared/real`` beside
 the clone.  Where it is absent, the tests in this folder are left out (``tests/alone.py``).
@@ -17,7 +17,7 @@ REAL = Path(
 
 
 def real(name: str) -> str:
-    """Name of a file or folder below that folder, which must be there."""
+    """Name of a file or folder below that folder, which must exist."""
     path = REAL / name
     assert path.exists(), f"{path} is absent"
     return str(path)

@@ -1,4 +1,4 @@
-"""binouts of others against independent readings."""
+"""Binouts from other people, compared with independent readings."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ ANSYS = "ansys-example-data__result_files-binout-binout_glstat"
 PLADE = "dyna_pladebuk__Plade_300_150_4-BB-binout"
 
 
-# As read by lasso-python 2.0.4; of the whole model where no part is named; states from 0.
+# As read by lasso-python 2.0.4, for the whole model if no part is named; states are counted from 0.
 NUMBERS = rows_of("numbers_of_lasso")
 
 

@@ -1,4 +1,4 @@
-"""d3plot of others: against what lasso-python read of them, the glstat of the same run, and lasso-python itself."""
+"""d3plots from other people, compared with lasso-python and with the glstat of the same run."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def test_states_are_those_that_were_read_before(folder: str) -> None:
     ids = [part.id for part in database.parts]
     assert ids == (
         truth["part_ids"] or list(range(1, len(ids) + 1))
-    )  # where they are numbered one by one
+    )  # if they are numbered consecutively
     assert database.time.size == truth["states"]
     for state in truth["at"]:
         state_number, parts = int(state["state"]), state["parts"]

@@ -1,4 +1,4 @@
-"""What is found in public decks that hold, or pretend to hold, switching cards.
+"""Findings in public decks that contain, or seem to contain, switching cards.
 
 No public deck with an active *DEFORMABLE_TO_RIGID_AUTOMATIC by time was found: the real ones here have plain
 or restart cards, a pair by contact force, a disabled card, templates and a documentation snippet.
@@ -113,7 +113,7 @@ def test_any_file_of_a_public_run_is_the_run(name: str) -> None:
     checked = check_deck(real(f"radioss-decks/{name}"))
     assert [finding.rule for finding in checked.findings] == [
         "D2R003"
-    ]  # qadiags.inc is not there
+    ]  # qadiags.inc is missing
     assert len(checked.files) == 3
     assert {(window.tr, window.td) for window in checked.windows} == {(0.0, 0.05)}
     assert [window.part for window in checked.windows] == [1]
@@ -123,7 +123,7 @@ def test_a_public_run_that_switches_nobody() -> None:
     checked = check_deck(real("radioss-decks/BLOCK_0000.rad"))
     assert [finding.rule for finding in checked.findings] == [
         "D2R003"
-    ]  # qadiags.inc is not there
+    ]  # qadiags.inc is missing
     assert checked.windows == ()
 
 
@@ -163,5 +163,5 @@ def test_a_real_deck_is_counted() -> None:
         1: {"solid": 24},
         2: {"shell": 350, "triangle": 8},
     }
-    assert not inventory.complete  # one of its includes is absent
+    assert not inventory.complete  # one of its includes is missing
     assert not inventory.parts[1].section.turns

@@ -1,4 +1,4 @@
-"""Files that solvers really wrote: what is read from each, or why it is refused.
+"""Files written by real solvers: what is read from each, or why it is refused.
 
 What is expected of each stands in ``readable.csv``: the first state, the one in the middle (n // 2, from 0) and the
 last, read by others:
@@ -23,7 +23,7 @@ from tests.real.files import real, rows_of
 
 READABLE = {
     row["file"]: row for row in rows_of("readable")
-}  # asked: refused without, taken when it is asked for
+}  # refused by default, but accepted on request
 
 LISTING = "this is a listing of LS-DYNA"
 REFUSED = {
@@ -32,7 +32,7 @@ REFUSED = {
     "qd-cae-python__test-binout": "no glstat or matsum in it, but swforc; name the binout of the run that contains it",
 }
 
-# Tables among the files beside them, and what is said of each.
+# Tables among the files next to them, and the note on each.
 MORE = {
     "FV_crashworthiness__DRI-OLD_LSDYNA-z_many.csv": "'Z-acceleration', by its name not an internal energy",
     "FV_crashworthiness__F28_validation-plot-data.csv": r":14: time steps back from 12\.011 to 0\.967",
@@ -67,7 +67,7 @@ def test_read(file: str) -> None:
     )
     digits = {"radioss-th": 1e-6, "matsum": 1e-15}.get(
         history.format, 0.0
-    )  # sums depend on their order
+    )  # the sums depend on the order of their terms
     for position, state in (
         ("first", 0),
         ("middle", history.time.size // 2),

@@ -1,4 +1,4 @@
-"""Real histories over a grid of td: no traceback, no warning of a library, and health and flight never contradict."""
+"""Real histories over a grid of td: no traceback, no library warning, and no contradiction of health and flight."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ FILES = [
     *(f"more-histories/{name}" for name in (*MORE, *PAIRS)),
     f"{QA}IMPOSED-IMPDISP_FGEO-reference-mapSimpleT01",
     f"{QA}OPTIONS-damp-new_test_v11-reference-FFO25SCBT01",
-    f"{QA}RESSORT-couple-reference-TYPE8MT01",  # driven up to 0.41, free from then on
+    f"{QA}RESSORT-couple-reference-TYPE8MT01",  # driven until 0.41, then free
     f"{QA}SUBMODEL-TRANSF-reference-BOULE1V5T01",
     *DRIVEN,
 ]
@@ -39,7 +39,7 @@ def test_nothing_fails_at_any_td_and_no_flight_contradicts_the_health(
     try:
         reference = Reference.of(open_run([real(name)]))
     except D2RPickError:
-        return  # refused; what is said of it is tested with the readers
+        return  # refused; the tests of the readers cover the message
     for td in np.linspace(
         reference.history.time[0], reference.history.time[-1], _TIMES
     ).tolist():

@@ -1,4 +1,4 @@
-"""What is read from files of others: numbers found by other means."""
+"""Content of files from other people, compared with numbers found by other means."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ REAL = [
 def test_real_files_have_the_numbers_of_the_solvers_own_converter(
     file: str, states: int, globals_: int, parts: list[tuple[int, str]]
 ) -> None:
-    """th_to_csv prints seven digits of each number, in the order of the file whatever its header says."""
+    """th_to_csv prints seven digits of each number, in the order of the file whatever its header contains."""
     run = TimeHistory(content(file), file)
     assert [(part.id, part.title) for part in run.parts] == parts
     assert len(run.channels) == globals_
@@ -113,7 +113,7 @@ def test_real_files_have_the_numbers_of_the_solvers_own_converter(
 
 
 def test_each_part_of_a_real_file() -> None:
-    """Numbers cut out of the file by awk: state (from 1), time and the internal energies of the parts."""
+    """Numbers extracted from the file with awk: state (from 1), time and the internal energies of the parts."""
     run = matsum.Matsum(content("PILLARS-LSDyna__Bolt_B_Explicit-matsum"), "matsum")
     titles = {
         10: "Plate 1", 20: "Plate 2", 100: "Bolt", 110: "Bolt Head", 120: "Bolt Nut",
@@ -137,7 +137,7 @@ def test_each_part_of_a_real_file() -> None:
 
 
 def test_titles_of_a_real_file_are_found_by_number() -> None:
-    """Its legend is in another order than its blocks."""
+    """The order of its legend differs from that of its blocks."""
     run = matsum.Matsum(
         content("lasso-python__sph_models-R7_1_2-binout.l2a-matsum"), "matsum"
     )
@@ -181,7 +181,7 @@ def test_legs() -> None:
 
 
 def test_glstat_and_matsum_of_one_run_are_joined_by_their_printed_times() -> None:
-    """94 of the 1001 times are printed alike, in six and in five digits."""
+    """94 of the 1001 times are printed identically with six and with five digits."""
     stem = "histories/PILLARS-LSDyna__Bolt_B_Explicit-"
     run = open_run([real(f"{stem}{kind}") for kind in ("matsum", "glstat")])
     assert run.notes == ()

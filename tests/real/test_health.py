@@ -1,4 +1,4 @@
-"""Health of runs of others: the names of each solver are found."""
+"""Health of runs from other people: the names used by each solver are found."""
 
 from __future__ import annotations
 

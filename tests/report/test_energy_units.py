@@ -1,4 +1,4 @@
-"""Units of energy on axes and in headings: those that the head of the energy column contains, and no others."""
+"""Units of energy on axes and in headings: those given in the header of the energy column, and no others."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""The interactive part of a page in a real browser shows for each td what ``suggest --td`` prints."""
+"""In a real browser, the interactive part of a page shows for each td what ``suggest --td`` prints."""
 
 import base64
 import json
@@ -55,13 +55,13 @@ return [...document.body.querySelectorAll("*")]
   .map((one) => one.outerHTML.slice(0, 120));
 """
 
-# Where the first and the last td lie in the chart of the energy, in pixels.
+# Positions of the first and the last td in the energy chart [px].
 ENDS = """
 const { rows, view: [from, to] } = JSON.parse(document.getElementById("explorer-data").textContent).flights[0];
 const width = document.querySelector(".energy .u-over").clientWidth;
 return [rows[0], rows[rows.length - 1]].map(([[td]]) => (td - from) / (to - from) * width);
 """
-# All that is said of the td in sight, at once: each question to a browser takes its time.
+# All texts about the visible td in one request, because each request to a browser takes time.
 SAID = """
 const values = [...document.querySelectorAll("[data-value]")].map((one) => [one.dataset.value, one.textContent]);
 const spoken = document.querySelector(".handle").getAttribute("aria-valuetext");
@@ -84,7 +84,7 @@ class Browser:
         self.driver = driver
 
     def open(self, page: Path, *, width: int = 1280, **media: str) -> None:
-        """Open a page at a width [px], with media preferences of the reader such as ``prefers_color_scheme="dark"``."""
+        """Open a page at a width [px], with media preferences such as ``prefers_color_scheme="dark"``."""
         size = {
             "width": width,
             "height": 900,
@@ -143,7 +143,7 @@ class Browser:
         return WebDriverWait(self.driver, timeout=20).until(found)
 
     def cut(self) -> list[str]:
-        """Return the texts cut at the right edge, and a note if the page is wider than the screen."""
+        """Return the texts that are cut at the right edge, and a note if the page is wider than the screen."""
         cut_texts: list[str] = self.driver.execute_script(_CUT)
         wide = self.driver.execute_script(
             "return document.documentElement.scrollWidth > document.documentElement.clientWidth"
@@ -408,7 +408,7 @@ def test_who_listens_can_use_it(paper: Path, browser: Browser) -> None:
     td_known = [row["td"] for row in list_numbers(paper)]
     handle = browser.find(".handle")
     for keys, td in (("", 0.064), (Keys.END, td_known[-1]), (Keys.HOME, td_known[0])):
-        handle.send_keys(keys)  # it takes the focus, so it can be reached by keyboard
+        handle.send_keys(keys)  # it gets the focus, so it can be reached by keyboard
         (slider,) = browser.spoken({"slider"}, td)
         property_values = {
             property_["name"]: property_["value"].get("value")
@@ -443,7 +443,7 @@ def test_nothing_is_cut_with_and_without_scripts(
             assert browser.cut() == []
             assert browser.shown("#explorer") == scripts
             assert browser.shown("figure.drawn") == (not scripts)
-            assert not browser.shown(".sign")  # for paper alone
+            assert not browser.shown(".sign")  # only for print
             assert browser.shown(".hint") == (width < 960)
             assert len(browser.all(".copy")) == (
                 len(browser.all("pre")) if scripts else 0
@@ -623,7 +623,7 @@ def test_a_page_of_many_states_stays_small(tmp_path: Path) -> None:
     row = len(json.dumps(flight["rows"])) / len(flight["rows"])
     assert (
         page.stat().st_size + 2 * STEPS * row < 600_000
-    )  # the most td that a page explores
+    )  # largest number of td that a page explores
 
 
 def compute_contrast(first_colour: str, second_colour: str) -> float:

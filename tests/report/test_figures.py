@@ -1,4 +1,4 @@
-"""Each figure has one message: the flight, the acceptable times in it, or the differences of runs."""
+"""Each figure has one message: the flight, the acceptable times in it, or the differences between runs."""
 
 from dataclasses import replace
 
@@ -145,7 +145,7 @@ def test_nothing_of_a_pages_figure_lies_outside_of_it_whatever_the_unit(
 
 
 def test_what_rests_is_drawn_flat_beside_what_the_run_has() -> None:
-    """Round-off of 1e-21 J is flat beside a landing of 40 J, or beside the scale of the energy if nothing lands."""
+    """Round-off of 1e-21 J is flat next to a landing of 40 J or, if nothing lands, on the scale of the energy."""
     time = np.linspace(0, 1, 501)
     energy = 1e-21 * (1 + np.sin(40 * time)) + 40.0 * (time > 0.9)
     answer = suggest_in_history(

@@ -35,7 +35,7 @@ COMMANDS = {
 
 pytestmark = pytest.mark.usefixtures("by_level")  # only the form matters here
 
-# A scan takes seconds, and a driven run needs a solver: their own tests write all their formats.
+# A scan takes seconds, and a driven run needs a solver, so their own tests write all their formats.
 QUICK = [
     (result, form)
     for result in FORMATS

@@ -1,4 +1,4 @@
-"""JSON documents and pages name every file behind an answer, with its SHA-256."""
+"""JSON documents and pages name every file on which an answer is based, with its SHA-256."""
 
 import hashlib
 from pathlib import Path

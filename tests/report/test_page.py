@@ -27,7 +27,7 @@ VOID = {"meta", "br", "hr", "link", "input"}
 PAPER = ("--td", "0.064", ENERGY)
 CHAIN = locate_stored("chain_referenceT01.gz")
 BOX = ("--td", "0.37", "--part", "box", "--no-verify", ROLLOVER_T01)
-# Of a command with its arguments: the exit code, what its page says, and what it must not say.
+# For a command with its arguments: the exit code, texts that its page contains, and texts that it must not contain.
 TOLD = {
     "parts, version, flight and health": (
         ("suggest", *BOX), 0,

@@ -1,4 +1,4 @@
-"""A narrowed table loses only optional columns, and keeps the requested width if its words allow it."""
+"""A narrowed table loses only optional columns, and keeps the requested width if its words allow this."""
 
 import csv
 import io
@@ -93,7 +93,7 @@ def test_spare_columns_are_left_out_in_their_order_and_only_where_room_is_short(
 
 
 def read_cell(value: Cell) -> str:
-    """Return what a csv reader gets for a value."""
+    """Return the value that a csv reader obtains for a cell."""
     ((cell, last),) = csv.reader(
         io.StringIO(as_csv([], [[value, "last"]]).removeprefix("\n")), strict=True
     )

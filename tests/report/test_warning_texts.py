@@ -1,4 +1,4 @@
-"""Every warning has an explanation: what it means for the decision, and what to do."""
+"""Every warning has an explanation with its meaning for the decision, and what to do."""
 
 import re
 

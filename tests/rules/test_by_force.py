@@ -1,4 +1,4 @@
-"""Force switches in a history with momenta: their times, their number, and the verdict on their windows."""
+"""Switches by a force in a history with momenta: their times, their number, and the verdict on their windows."""
 
 import re
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Sensors of a force in runs of OpenRadioss: plates that bounce on a contact, or on a rigid wall, 20 of them.
+"""Force sensors in 20 runs of OpenRadioss: plates that bounce on a contact or on a rigid wall.
 
 Half of the histories have the force of the contact or wall, the others only the momenta of the plate.  Runs only where
 OPENRADIOSS_PATH names an installation of OpenRadioss; takes some minutes.
@@ -77,7 +77,7 @@ def write_reals(*values: float) -> str:
 
 
 def write_bounce_deck(run: Bounce, *, switched: bool) -> str:
-    """Write the starter deck; its body has the sensor where the run is ``switched``."""
+    """Write the starter deck, whose body has the sensor if the run is ``switched``."""
     corners = range(_CELLS + 1)
     nodes = {(i, j): 1 + i * (_CELLS + 1) + j for i in corners for j in corners}
     text = f"#RADIOSS STARTER\n/BEGIN\nX\n{pad(2023, 0)}" + 2 * pad(
@@ -154,7 +154,7 @@ def read_listed_windows(folder: Path) -> list[tuple[float, float]]:
 
 
 def is_met(window: tuple[float, float], windows: list[tuple[float, float]]) -> bool:
-    """Return True if another window has the same ends, within an output interval of the history."""
+    """Return True if another window has the same ends to within an output interval of the history."""
     return any(
         window == pytest.approx(other_window, abs=INTERVAL) for other_window in windows
     )
@@ -164,7 +164,7 @@ def is_met(window: tuple[float, float], windows: list[tuple[float, float]]) -> b
 def test_the_sensor_switches_as_often_as_momenta_say(
     tmp_path: Path, run: Bounce
 ) -> None:
-    """In the reference run the sensor switches nothing, so its listing shows when it would have switched."""
+    """In the reference run, the sensor switches nothing, so its listing shows when it would have switched."""
     reference, switched = tmp_path / "reference", tmp_path / "switched"
     engine = f"/RUN/X/1\n{END}\n/VERS/2023\n/DT\n0.9 0.0\n{{}}/DTIX\n2e-05 2e-05\n/TFILE/4\n{INTERVAL}\n/PRINT/-1\n"
     for folder, off_cards in ((reference, f"/RBODY/OFF\n{MAIN}\n"), (switched, "")):
@@ -181,8 +181,8 @@ def test_the_sensor_switches_as_often_as_momenta_say(
     ]
     listed = read_listed_windows(reference)
     for windows_a, windows_b in ((predicted, listed), (listed, predicted)):
-        # A window shorter than an interval may lie between two states of the history.  Momenta do not show a force
-        # that is small compared with the weight.
+        # A window shorter than an interval may lie between two states of the history. Momenta do not show a force
+        # that is small relative to the weight.
         shortest = INTERVAL if run.forces else 3 * INTERVAL
         lasting = [(tr, td) for tr, td in windows_a if td - tr > shortest]
         assert lasting

@@ -48,7 +48,7 @@ def test_a_mistake_of_units_is_one_finding(
 
 
 def test_a_time_after_the_run_is_one_finding(tmp_path: Path) -> None:
-    """It is outside the history as well; where its rule is ignored, the history says so."""
+    """It is outside the history as well; if its rule is ignored, the finding about the history appears."""
     history = str(tmp_path / "energy.csv")
     assert run("replay", *OSCILLATOR.split(), "-o", history).exit_code == 0
     options = (write_timed_deck(tmp_path, "0.0135867", "68.7534"), "--history", history)

@@ -1,4 +1,4 @@
-"""Files of Radioss runs: what is missing, what is cut, and what belongs to which deck."""
+"""Files of Radioss runs: missing and truncated files, and which deck they belong to."""
 
 from pathlib import Path
 

@@ -450,7 +450,7 @@ def test_a_near_miss_is_named() -> None:
 
 
 def test_the_cure_of_an_active_nodal_body_is_no_mistake_itself(tmp_path: Path) -> None:
-    """A body that also holds a deformable part must not be deleted (D2R120), so D2R112 does not advise it."""
+    """A body that also contains a deformable part must not be deleted (D2R120), so D2R112 does not advise this."""
     deleted = RULES["D2R120"].failing[-1].deck
     active = re.sub(
         r"(\$ +nrbf.*\n) {9}[12]", lambda card: card[1] + f"{0:10d}", deleted

@@ -1,4 +1,4 @@
-"""Switch sets with CODE 5: what their *SENSOR_CONTROL does, by the time and by forces that a history has."""
+"""Switch sets with CODE 5: what their *SENSOR_CONTROL does, given the time and the forces in a history."""
 
 import math
 from pathlib import Path
@@ -30,7 +30,7 @@ def flat(found: dict[str, object]) -> list[float | None]:
 
 
 def control(switches: str, initial: str = "OFF", repeats: int = 0) -> str:
-    """Write the control of set 20; ``switches`` are numbers between blanks."""
+    """Write the control of set 20; ``switches`` are numbers between spaces."""
     first = f"{5:10d}{'DEF2RIG':>10}{20:10d}{0:10d}{repeats:10d}\n"
     numbers = "".join(f"{number:>10}" for number in switches.split())
     return f"*SENSOR_CONTROL\n{first}{initial:>10}{numbers}\n"
@@ -123,7 +123,7 @@ def test_a_set_by_time_may_be_undone_by_a_sensor(tmp_path: Path) -> None:
 
 
 def test_a_pair_waits_for_the_force_of_its_own_contact(tmp_path: Path) -> None:
-    """No momenta are written, and contact 8 never lets go."""
+    """No momenta are written, and contact 8 never ends."""
     folder = history(tmp_path, [(0.1, 0.2), (0.5, 0.6)])
     found = {}
     for contact in (7, 8):
@@ -163,7 +163,7 @@ def test_a_contact_whose_force_triggers_no_switch_is_not_followed(
 
 
 def test_a_card_is_timed_by_the_force_of_the_named_contact(tmp_path: Path) -> None:
-    """The pair that is printed switches in the planned window: it is read back with the same history."""
+    """The printed pair switches in the planned window when it is read back with the same history."""
     run_folder = history(tmp_path, [(0.1, 0.2), (0.5, 0.6)])
     card = ("card", "--tr", "0.25", "--td", "0.45", "--part", "1", "--no-deck")
     options = ("--solver", "ls-dyna-contact", "--history", run_folder)
@@ -220,7 +220,7 @@ def test_what_is_not_followed_is_named(cards: str, why: str, tmp_path: Path) -> 
 def test_switches_of_time_have_their_turns(
     tmp_path_factory: pytest.TempPathFactory, times: list[int], begins_on: bool
 ) -> None:
-    """A switch whose time is over when it has its turn acts at once: the changes are at the running maximum."""
+    """A switch whose time has passed when its turn comes acts at once, so the changes are at the running maximum."""
     cards = control(
         " ".join(str(number + 1) for number in range(len(times))),
         "ON" if begins_on else "OFF",

@@ -1,4 +1,4 @@
-"""Evidence of a whole record, as a finished run shows it."""
+"""Evidence of a whole record, as shown by a finished run."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 def take_whole_record(
     history: History, given_wait: float | None = None, of_deck: Wait | None = None
 ) -> GrowingEvidence:
-    """Take all states of a record at once."""
+    """Add all states of a record at once."""
     evidence = GrowingEvidence(given_wait, of_deck)
     evidence.take(history, history)
     return evidence

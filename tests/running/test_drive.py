@@ -21,6 +21,7 @@ from d2rpick.api.arguments import read_windows
 from d2rpick.api.drives import Driving
 from d2rpick.base.errors import D2RPickError
 from d2rpick.histories.opening import open_run
+from d2rpick.report.drive import describe_progress
 from d2rpick.running import engine
 from d2rpick.running.sequence import (
     LOAD,
@@ -87,7 +88,7 @@ def make_driving(folder: Path) -> Driving:
 
 
 def check_finished_run(report: dict[str, Any], folder: Path) -> None:
-    """Check what must hold for every finished run: it is complete, and rigid in the flight only."""
+    """Check what must hold for every finished run: it is complete, and rigid only in the flight."""
     switched = [
         window_row for window_row in report["windows"] if window_row["reason"] is None
     ]
@@ -242,7 +243,7 @@ def test_a_solver_that_hangs_is_ended_with_its_driver(tmp_path: Path) -> None:
 def test_a_run_goes_back_to_the_last_restart_that_is_whole(
     tmp_path: Path, whole: tuple[Path, dict[str, object]]
 ) -> None:
-    """If restart files are damaged, the run continues from an earlier one, in the end from that of the starter."""
+    """If restart files are damaged, the run continues from an earlier one, if necessary from that of the starter."""
     shutil.copytree(whole[0] / "deck", tmp_path / "deck")
     shutil.copytree(whole[0] / "run", tmp_path / "run")
     journal = tmp_path / "run" / "drive.ndjson"
@@ -394,9 +395,12 @@ def test_how_far_a_run_is_can_be_told_at_any_time(tmp_path: Path) -> None:
         starter=give_solver_command("starter"),
         engine=give_solver_command("engine"),
     ).driver(resume=False) as driver:
-        assert driver.progress(3.4) == "starting ... 3 s"
+        assert describe_progress(driver, 3.4) == "starting ... 3 s"
         driver.at = Order(RIGID, 2, 0.05, 0.2)
-        assert driver.progress(9.0) == f"engine run 2, rigid: 0.05 to 0.2 of {END:g}"
+        assert (
+            describe_progress(driver, 9.0)
+            == f"engine run 2, rigid: 0.05 to 0.2 of {END:g}"
+        )
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Force-free times, and how long they must last, for computed runs and for synthetic ones of known motion."""
+"""Force-free times, and how long they must last, for computed runs and for synthetic ones with known motion."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -19,7 +19,7 @@ from d2rpick.histories.opening import Selection, open_run
 from d2rpick.running.events import find_events, highest_energy
 from d2rpick.running.evidence import GrowingEvidence
 from d2rpick.running.inner_motion import Wait
-from d2rpick.running.witness import Quiet
+from d2rpick.running.witness import SeenFlight
 from tests.command import ROOT
 from tests.energies import require
 from tests.records import cut_history, make_table
@@ -36,9 +36,9 @@ def record(*names: str) -> History:
     )
 
 
-def list_spans(quiet_spans: Sequence[Quiet]) -> NDArray[np.float64]:
+def list_spans(seen_flights: Sequence[SeenFlight]) -> NDArray[np.float64]:
     """Return start and end of each span, NaN if unknown."""
-    return np.array([(span.start, span.end) for span in quiet_spans], np.float64)
+    return np.array([(span.start, span.end) for span in seen_flights], np.float64)
 
 
 @pytest.mark.parametrize(
@@ -62,15 +62,15 @@ def test_flights_of_computed_runs_are_seen_and_gaps_in_the_load_are_not(
     name: str, expected: list[tuple[float, float]]
 ) -> None:
     history = record(name)
-    quiet_spans = take_whole_record(history).flights()
-    assert list_spans(quiet_spans)[: len(expected)] == pytest.approx(
+    seen_flights = take_whole_record(history).flights()
+    assert list_spans(seen_flights)[: len(expected)] == pytest.approx(
         np.array(expected), abs=5e-4
     )
     assert all(
         span.seen - span.start >= span.wait.time and span.left <= 1e-4
-        for span in quiet_spans
+        for span in seen_flights
     )
-    assert all(span.gravity == pytest.approx(9.81, rel=5e-3) for span in quiet_spans)
+    assert all(span.gravity == pytest.approx(9.81, rel=5e-3) for span in seen_flights)
 
 
 def test_a_swing_with_a_push_in_it_makes_no_wait_longer() -> None:
@@ -101,12 +101,12 @@ def test_the_wait_that_was_measured_in_the_car_is_not_refused() -> None:
 @pytest.mark.parametrize("name", [CAR, BOX])
 def test_what_is_seen_rests_on_no_later_state(name: str) -> None:
     history = record(name)
-    quiet_spans = take_whole_record(history).flights()
+    seen_flights = take_whole_record(history).flights()
     for time in history.time[[300, 640, 900]].tolist():
         early = cut_history(history, time)
         early_spans = take_whole_record(early).flights()
         assert [span[:2] for span in early_spans] == [
-            span[:2] for span in quiet_spans if span.seen <= time
+            span[:2] for span in seen_flights if span.seen <= time
         ]
 
 
@@ -118,8 +118,8 @@ def test_a_rigid_leg_shows_its_contact_by_the_model_alone() -> None:
 
 def test_flights_are_seen_before_between_and_in_rigid_legs() -> None:
     switched = record(*(f"drop2_w123_T0{leg}.gz" for leg in (1, 2, 3, 4)))
-    quiet_spans = take_whole_record(switched).flights()
-    assert list_spans(quiet_spans)[:2] == pytest.approx(
+    seen_flights = take_whole_record(switched).flights()
+    assert list_spans(seen_flights)[:2] == pytest.approx(
         np.array([(0.0, 0.2858), (0.3022, 0.3386)]), abs=1e-3
     )
 
@@ -147,7 +147,7 @@ def test_flights_begin_and_end_where_info_and_plan_find_them() -> None:
 
 
 def test_a_flight_that_rises_says_when_it_is_level_again() -> None:
-    """The rollover box rises at 1.5 m/s; because it rotates, it lands 6 % before it is level again."""
+    """The rollover box rises at 1.5 m/s; because of its rotation, it lands 6 % before it is level again."""
     rising = open_run([str(ROOT / "sample_data" / "rolloverT01.gz")]).history(
         Selection(parts=("box",))
     )
@@ -208,6 +208,56 @@ def test_no_flight_is_lost_behind_a_push_that_dies_away(
     assert 0.02 <= flight.start <= 0.05
     assert flight.seen <= 0.05 + wait
     assert flight.end == pytest.approx(0.17, abs=8e-4)
+
+
+def make_body_without_gravity(tail: float, noise: float) -> History:
+    """Return a body of 2 kg that is pushed at 0.1 and 0.5 s for 30 ms; then the force decays with the time ``tail``."""
+    time = np.arange(0.0, 1.0, 1e-3)
+    momentum = np.zeros((time.size, 1, 3))
+    momentum[:, 0] = -20.0, 0.0, 3.0
+    for start, impulse in ((0.1, (9.0, 0.0, -8.0)), (0.5, (-2.0, 5.0, 7.0))):
+        share = np.sin(np.pi / 2 * np.clip((time - start) / 0.03, 0.0, 1.0)) ** 2
+        if tail:
+            decay = np.exp(-np.maximum(time - start - 0.03, 0.0) / tail)
+            share *= 1 - 0.1 * decay
+        momentum[:, 0] += np.outer(share, impulse)
+    rounding = np.random.default_rng(1).normal(size=momentum.shape)
+    momentum += noise * float(np.abs(momentum).max()) * rounding
+    energy = 50.0 + 20.0 * np.cos(2 * np.pi * time / 0.05)
+    whole = Momenta(time, momentum, None, EXACT, (0,), masses=np.array([2.0]))
+    return make_table(time, energy, whole)
+
+
+@pytest.mark.parametrize("tail", [0.0, 1e-3, 5e-3, 0.02])
+@pytest.mark.parametrize("noise", [0.0, 1e-7, 1e-6])
+def test_a_body_without_gravity_flies_again_after_each_push(
+    tail: float, noise: float
+) -> None:
+    """A constant momentum, and the end of a push, must not pass for damping under a force that is not gravity."""
+    history = make_body_without_gravity(tail, noise)
+    wait = 0.03
+    flights = take_whole_record(history, wait).flights()
+    # After 8 decay times, 3e-5 of the impulse is left.
+    latest = 0.03 + 8 * tail
+    for flight, start, end in zip(
+        flights, (0.0, 0.1, 0.5), (0.1, 0.5, None), strict=True
+    ):
+        assert start <= flight.start <= start + latest
+        assert flight.start + wait <= flight.seen <= start + latest + 2 * wait
+        assert flight.end == (end and pytest.approx(end, abs=5e-3))
+        assert flight.gravity == 0.0
+
+
+@pytest.mark.parametrize("friction", [2.0, 20.0])
+def test_a_body_that_friction_has_stopped_does_not_fly(friction: float) -> None:
+    time = np.arange(0.0, 1.0, 1e-3)
+    momentum = np.zeros((time.size, 1, 3))
+    momentum[:, 0, 0] = np.maximum(5.0 - friction * np.maximum(time - 0.2, 0.0), 0.0)
+    whole = Momenta(time, momentum, None, EXACT, (0,), masses=np.array([2.0]))
+    history = make_table(time, np.full(time.size, 50.0), whole)
+    (flight,) = take_whole_record(history, 0.03).flights()
+    assert flight.start == 0.0
+    assert flight.end == pytest.approx(0.2, abs=5e-3)
 
 
 @settings(max_examples=4)

@@ -202,6 +202,34 @@ def test_ls_dyna_gets_a_pair_of_switches_with_contact_codes(tmp_path: Path) -> N
     assert any("has no force-free time" in note for note in prepared.notes)
 
 
+def test_constraints_on_the_parts_are_deleted_and_used_ids_are_left_alone(
+    tmp_path: Path,
+) -> None:
+    main = Path(write_dyna_run(tmp_path / "ref"))
+    body = "*CONSTRAINED_NODAL_RIGID_BODY\n         9         0         5\n"
+    body += "*SET_NODE_LIST\n         5\n         3         5\n"
+    used = "*SET_PART_LIST\n       901\n         3\n"
+    main.write_text(main.read_text().replace("*END", f"{body}{used}*END"))
+    prepared = d2.first(str(main), tmp_path / "next", parts="1-2", wait=0.02)
+    lines = Path(prepared.files[1]).read_text().splitlines()
+    following = {
+        name: [
+            lines[number + 1][:20].split()
+            for number, line in enumerate(lines)
+            if line.startswith("$#") and name in line
+        ]
+        for name in ("swset", "nrbf")
+    }
+    assert following == {
+        "swset": [["902", "2"], ["903", "4"]],
+        "nrbf": [["1", "0"], ["2", "0"]],
+    }
+    assert any("NRBF" in note for note in prepared.notes)
+    assert {finding.rule for finding in d2.check(prepared.files[0]).findings} <= {
+        "D2R302"
+    }
+
+
 @pytest.mark.parametrize(
     "contact", ["AUTOMATIC_SINGLE_SURFACE_ID", "AUTOMATIC_GENERAL_ID"]
 )

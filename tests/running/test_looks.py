@@ -1,4 +1,4 @@
-"""What a look at growing files adds: only new states, or all states if files were written again."""
+"""What a look at growing files adds: only new states, or all states if files were rewritten."""
 
 import gzip
 from pathlib import Path
@@ -10,9 +10,10 @@ from d2rpick.base.errors import FormatError
 from d2rpick.histories.history import History, Samples
 from d2rpick.histories.names import Selection
 from d2rpick.histories.opening import open_run
-from d2rpick.running.events import Event
+from d2rpick.report.follow import describe_news
+from d2rpick.running.events import RunEvent
 from d2rpick.running.looks import Looks
-from d2rpick.running.watch import Watch
+from d2rpick.running.watch import News, Watch, follow
 from tests.command import ROOT
 from tests.energies import require
 from tests.histories.test_contact_forces import rcforc
@@ -66,7 +67,7 @@ def test_a_file_that_became_shorter_is_read_as_a_whole_at_whatever_byte_it_ends(
         path.write_bytes(data[: int(share * len(data))])
         states, follows = looks.new_states([str(path)])
         whole, _ = Looks(Selection()).new_states([str(path)])
-        # a binout ends with a table of its contents, without which it has all its states
+        # a binout ends with a table of its contents, without which it still has all its states
         assert follows is bool(whole.time[-1] == before.time[-1])
         assert states.time.size == (0 if follows else whole.time.size)
 
@@ -119,7 +120,7 @@ def cut_run(run: Written, count: int) -> Written:
 
 
 def _find_state(data: bytes, share: float) -> int:
-    """Return the end of a glstat state near a share of the length; for other contents, the length itself."""
+    """Return the end of a glstat state near a fraction of the length; for other contents, the length itself."""
     size = int(share * len(data))
     end = data.find(b"\n dt of cycle", size)
     return end if end > 0 else size
@@ -154,7 +155,7 @@ def test_a_look_at_a_file_that_is_read_as_a_whole_gives_the_new_states_alone(
 def test_a_state_that_was_not_yet_written_in_full_is_given_with_all_states(
     tmp_path: Path,
 ) -> None:
-    """Its numbers change, so results derived from it are discarded."""
+    """Its numbers change, so results that were derived from it are discarded."""
     run, looks = make_falling_masses(), Looks(Selection())
     for last_energy in (7.0, 8.0):
         cut = cut_run(run, 200)
@@ -194,7 +195,7 @@ def test_a_later_look_does_not_read_the_states_before_the_last_ones(
 def test_a_state_that_is_being_written_is_left_out_wherever_the_file_ends(
     tmp_path: Path, form: str, state_count: int
 ) -> None:
-    """What is written of it would lack the velocities or the momenta that show a force."""
+    """The new part of the file would lack the velocities or the momenta that show a force."""
     path = Path(FORMS[form](cut_run(make_falling_masses(), state_count), tmp_path))
     data, looks = path.read_bytes(), Looks(Selection())
     whole = open_run([str(path)]).history(Selection())
@@ -215,7 +216,7 @@ def test_a_state_that_is_being_written_is_left_out_wherever_the_file_ends(
 def test_states_at_the_same_printed_time_do_not_make_a_look_begin_again(
     tmp_path: Path, form: str
 ) -> None:
-    """The newest of them counts, so the last one is not given before a later time is written."""
+    """The newest of them is valid, so the last one is not returned before a later time is written."""
     run = cut_run(make_falling_masses(), 240)
     step = 4e-6 if form == "glstat" else 4e-5  # 2/5 of the last printed digit
     time = np.asarray(1 + step * np.arange(240), np.float64)
@@ -241,15 +242,14 @@ def test_a_run_is_watched_from_a_look_at_a_state_that_is_half_written(
 ) -> None:
     path = Path(as_glstat(make_falling_masses(), tmp_path))
     path.write_bytes(path.read_bytes().rpartition(b" global x velocity")[0])
-    begun, *_ = Watch([str(path)], Selection()).news()
-    assert begun.event == "begun"
-    assert begun.seen == pytest.approx(1 - 1 / 400)  # of the last but one state
+    news = Watch([str(path)], Selection()).look()
+    assert news.now == pytest.approx(1 - 1 / 400)  # part of the last state but one
 
 
 def test_files_of_one_run_that_grow_in_turn_are_read_on_and_forces_are_not(
     tmp_path: Path,
 ) -> None:
-    """One file has always a state that the other one has not yet; an rcforc holds no state of the history."""
+    """One file always has a state that the other one does not have yet; an rcforc has no states of the history."""
     run, looks = make_falling_masses(), Looks(Selection())
     contents = {}
     for form in ("glstat", "matsum"):
@@ -306,43 +306,38 @@ def test_the_events_of_a_file_that_grows_are_those_of_the_whole_file(
 ) -> None:
     path = Path(FORMS[form](make_falling_masses(), tmp_path))
     data = path.read_bytes()
-    whole = [
-        watch_event
-        for watch_event in Watch([str(path)], Selection()).news()
-        if watch_event.seen
-    ]
-    watch, events = Watch([str(path)], Selection()), list[Event]()
+    whole = list(follow([str(path)], Selection(), lasting=0.0))
+    watch, reads = Watch([str(path)], Selection()), list[News]()
     first = data[: _find_state(data, 0.3)]
     for content in (first, *(data[: int(share * len(data))] for share in SHARES)):
         path.write_bytes(content)
-        events += watch.news()
-    watch_events = [
-        watch_event
-        for watch_event in events
-        if watch_event.event not in ("begun", "restart")
+        reads.append(watch.look())
+    names = [str(path)]
+    events = [
+        event
+        for event in describe_news(reads, names, ())
+        if event.event not in ("begun", "restart")
     ]
-    assert watch_events == [
-        watch_event for watch_event in whole if watch_event.event != "begun"
-    ]
-    assert "flight" in {watch_event.event for watch_event in watch_events}
+    assert events == list(describe_news(whole, names, ()))[1:]
+    assert "flight" in {event.event for event in events}
 
 
 def test_a_growing_matsum_shows_the_flight_that_the_whole_one_shows(
     tmp_path: Path,
 ) -> None:
-    """Its masses are lower bounds from the states that were read: the last states alone show 145 of 350 kg."""
+    """Its masses are lower bounds from the states that were read; the last states alone show 145 of 350 kg."""
     data = (ROOT / "sample_data" / "rollover_box.matsum").read_bytes()
     watch = Watch([str(tmp_path / "matsum")], Selection(parts=("box",)))
-    events = list[Event]()
+    events = list[RunEvent]()
     for share in (0.3, 0.45, 0.5, 0.55, 0.6, 0.65, 1.0):
         (tmp_path / "matsum").write_bytes(data[: int(share * len(data))])
-        events += watch.news()
+        events += watch.look().events
     whole = Watch(
         [str(ROOT / "sample_data" / "rollover_box.matsum")], Selection(parts=("box",))
     )
     kinds = ("flight", "switch", "contact")
     assert [event[:3] for event in events if event.event in kinds] == [
-        event[:3] for event in whole.news() if event.event in kinds
+        event[:3] for event in whole.look().events if event.event in kinds
     ]
     masses = require(watch.looks.evidence.history.momenta[0].masses)
     assert masses == pytest.approx([350.0, 6.0], rel=1e-3)

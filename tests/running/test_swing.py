@@ -50,7 +50,7 @@ def test_what_a_flight_shows_up_to_tr_is_about_the_error_at_td(tr: float) -> Non
 def test_of_two_parts_the_most_that_the_heavy_one_may_be_off_is_told(
     swings: float,
 ) -> None:
-    """The parts vibrate against each other at 25 Hz, fall, and do not rotate; from an extremum the error is doubled."""
+    """The parts vibrate relative to each other at 25 Hz, fall, and do not rotate; an extremum doubles the error."""
     time, masses = np.linspace(0.0, 0.06, 241), np.array([30.0, 10.0])
     values = np.zeros((time.size, 2, 3))
     values[:, :, 2] = np.outer(-9.81 * time - 1.0, masses)
@@ -64,7 +64,7 @@ def test_of_two_parts_the_most_that_the_heavy_one_may_be_off_is_told(
     )
     assert first_swing.name == "block"
     assert first_swing.error == pytest.approx(2 * swings, abs=1e-5)
-    assert "at most" in first_swing.told
+    assert "at most" in first_swing.warning
 
 
 def test_nothing_is_said_where_no_momenta_of_parts_tell() -> None:

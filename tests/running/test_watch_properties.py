@@ -57,7 +57,7 @@ def test_a_gap_between_two_pushes_is_no_flight() -> None:
     first, last, _ = [event for event in found_events if event.event == "flight"]
     assert first.time == 0.0
     assert abs(require(last.time) - PUSHES[1][1]) <= 3 * STEP
-    assert 0.05 <= require(last.wait) <= 0.07
+    assert 0.05 <= require(last.flight).wait.time <= 0.07
     contacts = [
         event.time
         for event in found_events

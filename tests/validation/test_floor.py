@@ -1,4 +1,4 @@
-"""The perturbation floor: what is compared, and that the page shows the results."""
+"""The perturbation floor: what is compared, and whether the page shows the results."""
 
 import re
 from pathlib import Path

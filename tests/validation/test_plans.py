@@ -1,4 +1,4 @@
-"""Plans of falling boxes that are run window by window: the loop, the landings, and the results that are kept."""
+"""Plans of falling boxes that are computed window by window: the loop, the landings, and the stored results."""
 
 from __future__ import annotations
 

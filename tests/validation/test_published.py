@@ -191,7 +191,7 @@ def test_the_figures_of_the_box_say_what_a_coarse_box_does() -> None:
         all_variants[2],
         all_variants[6],
         all_variants[-1],
-    )  # two that act after td, two before
+    )  # two runs that act after td, and two before
     assert [variant.before for variant in some_variants] == [False, False, True, True]
     exhibits_by_name = {
         exhibit.name: exhibit
@@ -219,7 +219,7 @@ def test_the_figures_of_the_box_say_what_a_coarse_box_does() -> None:
     variants = exhibits_by_name["variants"].columns
     assert (
         np.ptp(variants["own_tr_ms"][:2]) < 1e-9
-    )  # what acts after td leaves tr alone
+    )  # actions after td leave tr unchanged
     assert np.ptp(variants["own_tr_ms"][2:]) > 0.1
     assert np.ptp(variants["common_tr_ms"]) == 0
     assert exhibits_by_name["variants"].agrees

@@ -202,7 +202,7 @@ def test_every_residual_of_the_nodes_is_near_the_predicted_one() -> None:
 def test_the_histories_of_the_references_give_the_residuals_of_the_nodes(
     case: str, best: float, accuracy: float
 ) -> None:
-    """The accuracy is that on the validation page; no residual of the nodes is above the upper bound."""
+    """The accuracy is that on the validation page; no residual from the nodes exceeds the upper bound."""
     reference = d2rpick.read(RESULTS / f"{case.lower()}_reference.csv")
     rows = TOTALS[TOTALS["case"] == case]
     for row in rows:
@@ -221,7 +221,7 @@ def test_the_histories_of_the_references_give_the_residuals_of_the_nodes(
 def predict_residual_of_nodes(
     reading: Reading, tr: float, td: float, end: float
 ) -> float:
-    """Return R of the velocities of all nodes from ``td`` to ``end`` [time], as the lines of the energy predict it.
+    """Return R of the velocities of all nodes from ``td`` to ``end`` [time], as predicted by the lines of the energy.
 
     Each line gives the energy of its mode and the phase, but for the sign of the mode, which both runs share.
     """

@@ -90,7 +90,7 @@ def test_a_fit_that_leaves_another_mode_fails_early() -> None:
         (0.0, True),
         (0.05, False),
         (0.1, False),
-    ):  # of the last four hundred samples show enough
+    ):  # structure in the last 400 samples is sufficient
         two = one_mode + share * np.exp(-S) * np.sin(33 * S) ** 2
         poles = Pencil.of(S, two).rates()
         quick_fit = fit_few(poles, S, two, VIBRATION, HOPELESS)

@@ -104,7 +104,7 @@ def test_a_clean_record_gives_all_parameters() -> None:
 @pytest.mark.parametrize(
     ("record", "bound"),
     [
-        # another factor for each seed, so that other digits are lost
+        # a different factor for each seed, so that different digits are lost
         (lambda seed: ENERGY * (1 + seed / 100), 1e-10),
         (lambda seed: round_as_printed(ENERGY * (1 + seed / 100)), 1e-7),
         (lambda seed: add_noise(ENERGY, 0.01, seed), 1e-3),
@@ -129,7 +129,7 @@ def test_least_squares_of_scipy_from_the_truth_ends_at_the_same_mode(seed: int) 
     best = least_squares(
         lambda p: make_mode(p).energy(TIME) - energy, truth, x_scale=[1, 1, 0.1, 0.1]
     )
-    sign = np.sign(mode.sine * best.x[3])  # q and -q make the same energy
+    sign = np.sign(mode.sine * best.x[3])  # q and -q give the same energy
     ours = list_parameters(mode)[:4] * [1, 1, sign, sign]
     np.testing.assert_allclose(
         ours, best.x, atol=1e-3 * np.sqrt(np.diag(fitted.covariance)).max(), rtol=1e-5
@@ -141,7 +141,7 @@ def test_random_valid_records_are_accepted_with_the_right_parameters() -> None:
     for seed in range(40):
         time, energy, truth = draw_record(seed)
         fitted, mode = identify_accepted(time, energy)
-        # six standard deviations of the fit, or what a plastic work or preload too small to notice shifts
+        # six standard deviations of the fit, or the shift due to a plastic work or preload too small to be noticed
         margin = 6 * fitted.covariance[0, 0] ** 0.5 + 1e-3 * truth.omega
         assert abs(mode.omega - truth.omega) < margin, seed
 
@@ -357,7 +357,7 @@ def test_a_preload_that_hardly_shows_is_a_vibration_of_half_the_rate_with_room_f
 def test_what_has_too_few_samples_is_not_taken_for_a_vibration_of_half_its_rate() -> (
     None
 ):
-    """A fast vibration about a preload, aliased, must not be accepted without a look at its samples."""
+    """A fast, aliased vibration about a preload must not be accepted without a check of the number of samples."""
     for rate in np.linspace(4.1, 4.6, 6).tolist():
         time = np.arange(0.0, 6.0, 1 / rate)
         assert not identify(

@@ -1,4 +1,4 @@
-"""The scatter of a record, followed to the residuals: compared with what many noisy records say."""
+"""The effect of noise on residuals, compared with the scatter in many noisy records."""
 
 from __future__ import annotations
 

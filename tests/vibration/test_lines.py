@@ -81,7 +81,7 @@ def test_the_first_part_does_not_predict_what_a_later_push_does() -> None:
 
 @pytest.mark.parametrize("damping", [0.0, 2.0], ids=["weak", "soon gone"])
 def test_a_fast_line_does_not_pass_for_a_slower_one(damping: float) -> None:
-    """Means over blocks of states would show it at a rate that is below their own."""
+    """Means over blocks of states would show it at a frequency below its own."""
     height = 0.01 if damping == 0 else 0.5
     rates = np.array([20.0, 131.0])
     fast = height * np.exp(-damping * TIME) * np.cos(rates[1] * TIME + 0.4)
@@ -94,7 +94,7 @@ def test_a_fast_line_does_not_pass_for_a_slower_one(damping: float) -> None:
 
 
 def test_a_line_that_stands_out_of_the_noise_is_found() -> None:
-    """The prediction gets hardly better by it, since noise is most of what is left."""
+    """The prediction hardly improves with it, because noise is most of the remaining misfit."""
     noise = 0.05 * np.random.default_rng(4).standard_normal(TIME.size)
     energy = 2.0 + np.cos(20.0 * TIME) + 0.03 * np.cos(31.0 * TIME) + noise
     lines = require(predict(make_even_grid(TIME, energy))).spectrum.lines

@@ -1,4 +1,4 @@
-"""Lines that are locked to others: of springs that stiffen, of stretches, and of stretches that swing."""
+"""Lines that are locked to others: of stiffening springs, and of constant or oscillating deformations."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class StiffeningSpring:
         return position**2 / 2 + self.stiffening * position**4 / 4
 
     def keeps_sign(self, tr: Samples, td: Samples) -> Samples:
-        """Return 1 where both positions are alike, -1 where they are opposite, in between elsewhere."""
+        """Return 1 if both positions are equal, -1 if they are opposite, and a value in between otherwise."""
         return self.compute_positions(tr) * self.compute_positions(td)
 
 
@@ -76,7 +76,7 @@ def test_a_stretch_is_not_taken_for_a_spring(stretch: float) -> None:
 
 @pytest.mark.parametrize("depth", [0.05, 0.2, 0.5])
 def test_a_stretch_that_swings_gives_a_mode_no_further_ones(depth: float) -> None:
-    """As a part on a hinge pulls: the truth is in the band, and modes alone would say more energy than there is."""
+    """A part on a hinge pulls like this: the truth is in the band, and modes alone would give too much energy."""
 
     def compute_stretch(time: Samples) -> Samples:
         return depth * (1.5 + np.cos(2.9 * time + 0.7))

@@ -1,4 +1,4 @@
-"""Measures of a pair of times, against the motion of the oscillator and against independent digits."""
+"""Measures of a pair of times, compared with the motion of the oscillator and with independent digits."""
 
 import numpy as np
 import pytest

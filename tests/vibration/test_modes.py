@@ -124,7 +124,7 @@ def test_at_extrema_the_deformation_stands_still_and_between_them_it_does_not(
 def test_peaks_are_higher_than_their_neighbourhood(mode: Mode) -> None:
     peaks = np.array(mode.peaks(-0.5, 2.0))
     h = 1e-3 / mode.omega
-    # a peak next to zero lies between two zeros that may be as near
+    # a peak next to zero lies between two zeros that may be equally close
     high = peaks[mode.deformation(peaks) ** 2 > 1e-4 * np.max(mode.deformation(T) ** 2)]
     for side in (-h, h):
         assert np.all(mode.energy(high) > mode.energy(high + side))
@@ -132,7 +132,7 @@ def test_peaks_are_higher_than_their_neighbourhood(mode: Mode) -> None:
 
 @given(
     MODES, st.floats(-0.999, 0.999)
-)  # a level that is touched is met by rounding or not
+)  # rounding decides whether a touched level is crossed
 def test_crossings_are_all_sign_changes_on_a_fine_grid(
     mode: Mode, share: float
 ) -> None:
@@ -145,7 +145,7 @@ def test_crossings_are_all_sign_changes_on_a_fine_grid(
         level,
         atol=1e-13 * (10 + abs(level)) * (1 + mode.omega),
     )
-    # what the grid shows was found; two crossings inside one of its cells only show in pairs
+    # every crossing on the grid was found; two crossings inside one grid cell show only as a pair
     assert len(crossings) >= np.count_nonzero(above[1:] != above[:-1])
     assert (len(crossings) - np.count_nonzero(above[1:] != above[:-1])) % 2 == 0
 

@@ -29,7 +29,7 @@ from tests.records import (
 )
 
 TIME = np.linspace(0, 6, 1200)
-# A second mode this near to a first, or so small beside it, is neither found nor missed.
+# A second mode this close to the first, or this small, is neither found nor counted as missed.
 _LEAST_APART, _LEAST_SHARE = 2 * np.pi / TIME[-1], 0.05
 PAIRS = np.array(
     [(tr, td) for tr, td in product(np.linspace(0.2, 4.0, 15), (4.3, 4.9, 5.5))]
@@ -94,7 +94,7 @@ def test_the_residual_is_predicted_from_the_total_energy(
     assert max(errors) <= worst
 
 
-# The line of a mode at half of another frequency was left out of the level, and passed for hidden energy.
+# The line of a mode at half of another frequency was left out of the level and treated as hidden energy.
 @example(6, 54966)
 @given(st.integers(2, 6), st.integers(0, 10**6))
 def test_rates_damping_and_energies_of_the_modes_are_found(
@@ -117,11 +117,11 @@ def test_rates_damping_and_energies_of_the_modes_are_found(
         )
         is_half = any(abs(rate - 2 * mode.omega) < 0.02 * rate for rate in rates)
         if is_half and abs(nearest.omega - mode.omega) > 0.1:
-            # its line may be that of a stretch of the mode at twice its rate: the doubt is stated
+            # its line may be that of a static deformation of the mode at twice its frequency: the doubt is stated
             assert modal.is_ambiguous or not modal.signed
             continue
         share = float(mode.vibration_energy(td)) / largest
-        near = 1e-4 if share > 0.05 else 3e-4  # a weak mode is known less well
+        near = 1e-4 if share > 0.05 else 3e-4  # a weak mode is known less accurately
         assert nearest.omega == pytest.approx(mode.omega, rel=near)
         assert nearest.alpha == pytest.approx(mode.alpha, abs=1e-2)
         assert nearest.vibration_energy_td == pytest.approx(
@@ -131,7 +131,7 @@ def test_rates_damping_and_energies_of_the_modes_are_found(
 
 @pytest.mark.parametrize("states", [300, 1200, 60_000])
 def test_the_modes_are_known_up_to_both_ends_of_their_window(states: int) -> None:
-    """Fine records are averaged over blocks, whose middles do not reach the ends."""
+    """Records with short intervals are averaged over blocks, whose middles do not reach the ends."""
     time = np.linspace(0, 6, states)
     modal = require(identify_modal(time, sum_energies(TWO, time)))
     assert modal.known_at(6.0)
@@ -195,7 +195,7 @@ def test_the_rollover_is_no_oscillator() -> None:
 
 
 def test_the_energy_of_one_part_in_which_modes_mix_is_refused() -> None:
-    """Lines at the sums and differences of the frequencies exceed the mean, which modes cannot do."""
+    """Lines at the sums and differences of the frequencies exceed the mean, which is impossible for modes."""
     first, second = (mode.deformation(TIME) for mode in TWO)
     assert not require(identify_modal(TIME, (first + second) ** 2)).signed
 
@@ -241,7 +241,7 @@ def test_several_modes_are_chosen_by_and_replayed() -> None:
 def test_modes_decide_where_an_oscillator_leaves_a_further_mode_over(
     share: float,
 ) -> None:
-    """The oscillator alone states a residual of 0 at any energy peak, while the other mode has the opposite sign."""
+    """The oscillator alone states a residual of 0 at any energy peak, although the other mode has the opposite sign."""
     main, root = Mode(2 * np.pi, 0.2, 0.3, 0.9, 0.0), float(np.sqrt(share))
     modes = [main, Mode(2 * np.pi * 2.3, 0.2, 0.5 * root, 0.8 * root, 0.0)]
     history = make_table(TIME, sum_energies(modes, TIME))

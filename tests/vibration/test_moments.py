@@ -35,7 +35,7 @@ MODE = Mode(omega=2 * np.pi, alpha=0.2, cosine=0.0, sine=1.0, origin=0.0)
 TD = 5.1
 PROFILE = Profile.of(MODE, np.arange(0, 6, 1 / 64), TD)
 
-# of tr_high - tr_low over the output interval, by samples per vibration period; with 8 they may be as wide as they need
+# width tr_high - tr_low over the output interval, by samples per vibration period; at 8 it is unlimited
 WIDEST = {8: np.inf, 12: 1.2, 20: 0.66, 50: 0.204, 200: 0.042}
 
 
@@ -123,7 +123,7 @@ def draw_mode(rng: np.random.Generator) -> Mode:
 def measure_coverage(
     samples_per_period: int, digits: int, *, jitter: float, runs: int
 ) -> tuple[float, float]:
-    """Return the share of visible crossings whose interval holds the true one, and the median width over the step."""
+    """Return the fraction of visible crossings whose interval contains the true one, and the median width per step."""
     rng = np.random.default_rng(20261)
     inside, widths = [], []
     for _ in range(runs):
@@ -226,7 +226,7 @@ def test_intervals_hold_the_true_crossing_where_a_fit_misses_a_small_mode(
             low, high = require(crossing.tr_low), require(crossing.tr_high)
             if (
                 np.abs(true - crossing.tr).min() < 0.25 / 2
-            ):  # the level is passed, not only nearly touched
+            ):  # the level is passed, not only touched
                 inside.append(bool(np.any((low <= true) & (true <= high))))
     assert len(inside) > 5 * runs
     assert np.mean(inside) >= 0.99
@@ -242,7 +242,7 @@ def test_an_interval_from_samples_grows_by_what_the_level_is_off_them() -> None:
     assert shifted_reach - exact == pytest.approx(0.009 / 3)
 
 
-# zero, or of a size whose squares still are numbers
+# zero, or of a size whose squares are still numbers
 sizes = st.one_of(st.just(0.0), st.floats(1e-100, 1e3))
 
 

@@ -23,7 +23,7 @@ from tests.records import MODES
 # zero, or of a size that an integrator's absolute tolerance does not hide
 numbers = st.one_of(st.just(0.0), st.floats(1e-3, 2.0), st.floats(-2.0, -1e-3))
 states = st.builds(State.of, numbers, numbers, numbers, numbers)
-# damping rates from none over the critical one (alpha/2 = omega_0) to far beyond it
+# damping rates from zero through the critical one (alpha/2 = omega_0) to far beyond it
 oscillators = st.builds(
     lambda stiffness, mass, beta, ratio: Oscillator(
         stiffness, mass, mass / beta, 2 * ratio * np.sqrt(stiffness * (1 + beta) / mass)

@@ -42,7 +42,7 @@ def test_the_residual_of_switched_runs_is_predicted() -> None:
         situation = examine_td(chain.read_chain_history(), td, PLAIN)
         assert situation.basis == "modal"
         for run in chain.scan():
-            if abs(run["td_s"] - td) > 1e-3:  # a step of the solver late
+            if abs(run["td_s"] - td) > 1e-3:  # a time step of the solver late
                 continue
             (candidate,) = judge_times(situation.at(run["td_s"]), [run["tr_s"]])
             errors.append(abs(require(candidate.residual) - run["R_sim"]))
@@ -67,7 +67,7 @@ def test_the_closest_match_is_recommended_although_the_total_energy_is_off(
     best = answer.candidates[0]
     assert require(answer.recommended).tr == best.tr == pytest.approx(0.08084, abs=1e-4)
     assert (best.kind, best.sign_match, best.recommended) == ("match", True, True)
-    assert is_in_band(0.0655, best)  # what the nearest switched run has
+    assert is_in_band(0.0655, best)  # residual of the nearest switched run
     assert best.level_error == pytest.approx(0.055, abs=0.01)
     # near the peak itself the energy is right as well, and nothing would be saved
     assert all(c.same_swing for c in answer.candidates if c.tr > 0.13)
@@ -84,7 +84,7 @@ def test_the_recommended_run_is_among_the_best_of_the_scan(source: str) -> None:
 
 
 def test_a_tr_of_the_wrong_direction_is_refused_in_every_switched_run() -> None:
-    """A pair with both springs upside down has a true residual above 1, and is never admissible."""
+    """A pair with the wrong sign in both springs has a true residual above 1, and is never admissible."""
     upside_down = [run for run in chain.scan() if run["sign1"] < 0 and run["sign2"] < 0]
     assert upside_down
     for run in upside_down[::4]:
@@ -137,7 +137,7 @@ def make_history_of_motion(motion: Motion, noise: float = 0.0) -> History:
 def test_of_a_part_that_bends_in_two_planes_the_residual_is_in_its_range(
     share: float, noise: float
 ) -> None:
-    """No energy of a part is a square then; the modes of the whole structure tell the residual."""
+    """The energy of a part is then not a square, but the modes of the whole structure give the residual."""
     truth, td = make_motion_in_planes(share), 0.31
     answer = suggest_in_history(
         make_history_of_motion(truth, noise), td, Settings(after=0.0)

@@ -1,4 +1,4 @@
-"""The span that one oscillator describes, how it is searched, and what its misfit may hide."""
+"""The span that one oscillator describes, how it is searched for, and what its misfit may hide."""
 
 import tracemalloc
 
@@ -138,7 +138,7 @@ def test_what_was_fitted_before_changes_no_answer() -> None:
 
 
 def add_second_mode(share: float, rate: float = 2.3) -> tuple[Mode, Mode]:
-    """Return the main mode and one with this share of its energy."""
+    """Return the main mode and a mode with this fraction of its energy."""
     root = float(np.sqrt(share * MAIN.vibration_energy(0.0)))
     return MAIN, Mode(
         rate * 2 * np.pi, 0.2, root * np.cos(1.0), root * np.sin(1.0) * 0.97, 0.0
@@ -153,7 +153,7 @@ def test_the_share_of_a_small_second_mode_is_estimated(
 ) -> None:
     energy = add_noise(sum_energies(add_second_mode(share, rate), TIMES), noise, seed=1)
     fitted = identify(TIMES, energy)
-    assert fitted.mode is not None  # its rest is too small to refuse it
+    assert fitted.mode is not None  # its remaining misfit is too small to refuse it
     assert fitted.describes_record
     assert estimate_hidden_share(TIMES, energy, fitted.mode) == pytest.approx(
         share, rel=0.5
@@ -227,7 +227,7 @@ def test_of_random_records_95_percent_are_within_their_bounds(kind: str) -> None
 
 
 def make_decaying_modes(scale: float) -> list[Mode]:
-    """Return a mode that lasts, and one that has died after the first of its periods."""
+    """Return a mode that lasts, and one that has decayed after the first of its periods."""
     return [
         Mode(320.23, 40.92, 1.024 * scale, -0.495 * scale, 0.0),
         Mode(1269.22, 382.38, -0.038 * scale, 0.130 * scale, 0.0),
@@ -266,7 +266,7 @@ def test_cells_without_states_do_not_deviate() -> None:
 
 
 def test_the_band_holds_for_a_mode_that_dies_early() -> None:
-    """At tr it holds more energy than all that vibrates at td, although one oscillator describes the record."""
+    """At tr, it has more energy than all that vibrates at td, although one oscillator describes the record."""
     modes = make_decaying_modes(1.0)
     time = np.linspace(0.0, 0.139, 2000)
     energy = sum_energies(modes, time)

@@ -1,4 +1,4 @@
-"""Counting the oscillation cycles of an energy: signs of an integrated motion, or none if a mode may be hidden."""
+"""Counted oscillation cycles of an energy give the signs of an integrated motion, or none if a mode may be hidden."""
 
 import numpy as np
 import pytest
@@ -51,7 +51,7 @@ def test_every_minimum_on_the_floor_is_a_passage_through_zero(
     counted = swings.amplitudes(TIME)[0]
     unclear = swings.unclear
     assert np.all((unclear == TIME[1]) | (unclear > TIME[-1] - np.pi))
-    # a sample next to a zero may lie on either side of it, and behind the last peak none is seen yet
+    # a sample next to a zero may lie on either side of it, and no zero is visible yet after the last peak
     clear = (np.abs(x) > 0.15 * np.exp(-alpha / 2 * TIME)) & (unclear.max() >= TIME)
     assert np.ptp(np.sign(counted[clear]) * np.sign(x[clear])) == 0
     np.testing.assert_allclose(counted**2, energy, atol=0.03 * energy.max())
@@ -106,7 +106,7 @@ def test_the_pair_of_a_spring_that_stiffens_has_the_sign_of_td(lifted: Samples) 
         assert answer.situation.basis == "swings"
         assert ("basis", "counted cycles of the energy") in list_situation_heading(
             answer.situation
-        )  # no word of parts
+        )  # no mention of parts
         at_tr, at_td = np.interp([require(answer.chosen).tr, td], TIME, x)
         assert at_tr == pytest.approx(at_td, abs=0.2 * np.abs(x[td < TIME]).max())
         assert not any(
@@ -169,7 +169,7 @@ def make_two_planes(
 
 
 def test_the_band_of_counted_swings_is_neither_too_narrow_nor_useless() -> None:
-    """A residual of almost nothing once stood beside an upper bound of 1 to 2, where most true ones were below 0.2."""
+    """A residual near zero was once stated with an upper bound of 1 to 2, although most true ones were below 0.2."""
     rng = np.random.default_rng(1)
     outside, bounds, beside = [], [], []
     for _ in range(60):
@@ -198,5 +198,5 @@ def test_the_band_of_counted_swings_is_neither_too_narrow_nor_useless() -> None:
             beside += (high > 1)[stated < 0.05].tolist()
     assert len(outside) > 200
     assert np.mean(outside) < 0.05
-    assert np.median(bounds) < 0.3  # 0.39 with the variation of the floor itself
+    assert np.median(bounds) < 0.3  # 0.39 with the variation of the envelope itself
     assert not any(beside)

@@ -1,4 +1,4 @@
-r"""Predict the motion after td: the mean energy that a pair preserves, and its error relative to the next contact.
+r"""Predict the motion after td: how much mean energy a pair preserves, and its error relative to the next contact.
 
 An elastic energy V that is released at rest is shared equally between internal and kinetic energy.  With the static
 energy S and the vibration energy U of the reference run at td, the ratio of the mean internal energies after td is
@@ -31,10 +31,10 @@ if TYPE_CHECKING:
 
 # Relative error of vibration energies that are derived from spectral lines or counted oscillations [-].
 _KNOWN_WITHIN: Final = 0.1
-# Assumed upper bound of the number of similar modes with random phases; a computed car model had 100 such modes.
+# Assumed upper bound of the number of similar modes with random phases, as in a computed car model with 100 modes.
 # The total energy of m modes with random phases has a relative standard deviation of 1/sqrt(8 m).
 _MODES_OUT_OF_STEP: Final = 110
-# The mean energy after td may deviate from its prediction from spectral lines by at most this fraction [-].
+# Largest deviation of the mean energy after td from its prediction from spectral lines, as a fraction [-].
 _OF_SOLVER: Final = 0.005
 # Smallest number of states needed to determine the fluctuation of the energy.
 _FEWEST_STATES: Final = 8
@@ -65,7 +65,7 @@ def bound_mean_energy(
     if situation.basis != "oscillator":
         low = low - _OF_SOLVER
         high = high + _OF_SOLVER
-    # Vibrating parts that the user did not choose may transfer their energy to the chosen parts.
+    # Parts that vibrate but were not chosen may transfer their energy to the chosen parts.
     other_energy = situation.together.not_chosen.energy
     return MeanEnergyBounds(
         max(low, 0.0),
@@ -104,7 +104,7 @@ def _bound_vibration_energies(situation: Situation) -> list[tuple[float, float]]
     time, energy = select_energies_in_flight(situation)
     mean = float(np.mean(energy))
     damping_left = 1 / compute_mean_decay(situation, time)
-    # On average, half of the vibration energy is internal energy, which is added to the static energy.
+    # On average, half of the vibration energy is internal energy, which adds to the static energy.
     return [
         (max(situation.energy_td - (mean - whole / 2), 0.0), damping_left * whole)
         for whole in bounds
@@ -129,7 +129,7 @@ def bound_vibration_energy(situation: Situation) -> tuple[float, float] | None:
 
 
 class Worth(NamedTuple):
-    """Largest ratio of the energy of the vibration error to the energy of the next contact [-].
+    """Largest ratio of the vibration-error energy to the energy of the next contact [-].
 
     ``contact`` is the energy that the next contact puts into the parts [energy].
     """

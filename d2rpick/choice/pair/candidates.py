@@ -1,4 +1,4 @@
-"""Find and judge the candidates for tr at a given td, with their accuracy and the objections to them.
+"""Find the candidates for tr at a given td, and judge them by their accuracy and the objections to them.
 
 All candidates are judged at once, as columns; a `Candidate` is made only when it is looked up.
 """
@@ -30,9 +30,9 @@ if TYPE_CHECKING:
     from d2rpick.vibration.measures import Columns
 
 
-# Largest number of candidates that are judged in one batch; larger arrays need more memory and are not faster.
+# Largest number of candidates that are judged in one batch; larger arrays need more memory but are not faster.
 _MOST: Final = 20_000
-# Largest growth factor of the number of td that are judged together, from one batch to the next [-].
+# From one batch to the next, the number of td that are judged together grows at most by this factor [-].
 _MORE: Final = 8
 # A candidate gets a note if the upper bound of its residual exceeds the residual by more than this [-].
 MUCH_HIGHER = 0.1
@@ -41,7 +41,7 @@ _SAME_SWING = "on the same swing of the energy as td, which saves hardly anythin
 
 
 class Candidate(Measured, Record):
-    """One tr for the td of a situation; the fields are the keys of the JSON output, None if unknown.
+    """One tr for the td of a situation. The fields are the keys of the JSON output; None if a value is unknown.
 
     Times have the unit of the history; ``level_error``, ``lock_in_error``, ``residual`` and ``rigid_fraction`` have no
     unit.  ``kind`` is "crossing" of the level, "extremum" near the level, "match" of the deformations of several modes,
@@ -126,7 +126,7 @@ class Judged:
     def of(
         cls, situations: Sequence[Situation], moments_of_each: Sequence[Moments]
     ) -> Judged:
-        """Measure and judge the ``moments`` of each situation as tr; nothing is measured if nothing vibrates."""
+        """Measure and judge the ``moments`` of each situation as tr; if nothing vibrates, nothing can be measured."""
         sizes = [len(moments) for moments in moments_of_each]
         ends = [0, *accumulate(sizes)]
         if len(moments_of_each) == 1:
@@ -144,7 +144,7 @@ class Judged:
         energy, measured = measure_all(vibrations, tr, ends)
         level_error = measures.level_error(energy, energy_td)
         if at_rest.any():
-            # If nothing vibrates, the energy ratio contains nothing but rounding errors.
+            # If nothing vibrates, the energy ratio contains only rounding errors.
             level_error[at_rest] = 0.0
             measured = {
                 name: np.where(at_rest, np.nan, column)
@@ -196,7 +196,7 @@ class Judged:
 
     @property
     def recommendable(self) -> NDArray[np.bool_]:
-        """True for each candidate that ``suggest`` and ``verify`` accept: no objection, and no limit is exceeded."""
+        """True for each candidate that ``suggest`` and ``verify`` accept: it has no objections and exceeds no limit."""
         return self.acceptable & self.within_limits
 
     @property
@@ -218,7 +218,7 @@ class Judged:
     def error(self) -> Samples:
         """Error by which the candidates are ranked (see `Candidate.error`), shape (n,) [-]."""
         residual = self.columns["residual"]
-        # Candidates with a wide error band rank lower, because the smallest of many estimates is too optimistic.
+        # Candidates with a wide error band get a lower rank, because the smallest of many estimates is too optimistic.
         doubted = np.sqrt((residual**2 + self.columns["residual_high"] ** 2) / 2)
         error = np.where(
             np.isnan(residual),
@@ -236,7 +236,7 @@ class Judged:
 
     @property
     def near_td(self) -> NDArray[np.bool_]:
-        """True for each candidate of the model with many modes that saves hardly anything because it is close to td."""
+        """True for each candidate of the model with many modes that saves hardly any time because it is close to td."""
         starts = [_get_start_of_flight(situation) for situation in self.situations]
         flown = self.td - np.array(starts)[self.situation_of]
         return np.asarray(self.modal & (self.td - self.moments.tr < NEAR_TD * flown))
@@ -262,7 +262,7 @@ class Judged:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Candidates(Sequence[Candidate]):
-    """A lazy sequence of the candidates of one td in order of rank; each candidate is built when it is accessed.
+    """A sequence of the candidates of one td in order of rank, each of which is built when it is first accessed.
 
     ``order`` has the row numbers of the candidates in ``judged``; these are ranked if ``ranked`` is True.
     ``recommended`` is the position of the recommended candidate in ``order``, None if there is none.
@@ -281,7 +281,7 @@ class Candidates(Sequence[Candidate]):
 
     @property
     def recommendable(self) -> NDArray[np.bool_]:
-        """True for each candidate, in order of rank, that is acceptable and within the limits of the settings."""
+        """True for each candidate, in order of rank, that is acceptable and within the limits in the settings."""
         return self.judged.recommendable[self.order]
 
     @cached_property
@@ -339,7 +339,7 @@ class Candidates(Sequence[Candidate]):
         return iter(self[:])
 
     def list_objections(self, rank: int, *, of_error: bool = True) -> tuple[str, ...]:
-        """Return why a candidate is not admissible; ``of_error`` False leaves out that its error is too large."""
+        """Return why a candidate is not admissible. If ``of_error`` is False, a large error is not mentioned."""
         return tuple(
             self._describe_objections(int(self.order[rank]), of_error=of_error)
         )
@@ -397,7 +397,7 @@ class Candidates(Sequence[Candidate]):
 
 
 def _get_start_of_flight(situation: Situation) -> float:
-    """Return the earliest tr in the flight [time]; minus infinity if it is unknown."""
+    """Return the earliest tr in the flight [time]; minus infinity if the earliest tr is unknown."""
     return -np.inf if situation.earliest_tr is None else situation.earliest_tr
 
 
@@ -442,7 +442,7 @@ def judge_times(situation: Situation, times: Iterable[float]) -> Candidates:
 
 
 def _find_start_at_rest(situation: Situation) -> Moments | None:
-    """Return the start of the flight, rounded up to printed digits, if nothing vibrates in it; otherwise None."""
+    """Return the start of a flight in which nothing vibrates, rounded up to printed digits; otherwise None."""
     start = situation.earliest_tr
     if start is None or not situation.at_rest:
         return None
@@ -452,7 +452,7 @@ def _find_start_at_rest(situation: Situation) -> Moments | None:
 
 
 def _mark_given_as_matches(situation: Situation, moments: Moments) -> Moments:
-    """Give each tr that coincides with a closest match the kind "match", because its accuracy is the same."""
+    """Set the kind of each tr that coincides with a closest match to "match", as its accuracy is that of a match."""
     is_given = moments.are("given")
     vibration = situation.vibration
     if situation.at_rest or not (is_given.any() and vibration.profile):
@@ -493,7 +493,7 @@ def _list_remarks(
     measured: Mapping[str, Any],
     objections: Sequence[str],
 ) -> Iterator[str]:
-    """Yield the notes on a tr, other than the objections, that do not make the tr unacceptable."""
+    """Yield notes on a tr that do not make it unacceptable, in addition to the objections."""
     undescribed = situation.vibration.undescribed
     if not (measured or situation.vibration.unknown or situation.at_rest):
         why = "" if undescribed in objections else f": {undescribed}"
@@ -507,7 +507,7 @@ def _list_remarks(
 
 
 def _describe_position(worst: Off | None) -> dict[str, Any]:
-    """Return the fields of a candidate for the largest position error; empty if it is unknown."""
+    """Return the fields of a candidate that describe the largest position error; empty if it is unknown."""
     if worst is None:
         return {}
     return {

@@ -1,4 +1,4 @@
-"""Decide on the verdict for a pair, with its reason, the expected and the worst motion after td, and a better pair.
+"""Decide on the verdict on a pair, its reason, the expected and the worst motion after td, and a better pair.
 
 All commands, output forms and pages use the texts of this module, so that they cannot contradict each other.
 """
@@ -47,7 +47,7 @@ _USE_BEST: Final = (
 _AVOID_BEST: Final = "choose another flight, or make other parts rigid"
 # _USE_COMPARED: the advice that replaces _USE_BEST if a switched run has been compared.
 _USE_COMPARED: Final = "use this pair if only the motion matters"
-# The worst case is shown only if its residual exceeds the expected residual by more than this [-].
+# The worst case is shown if its residual exceeds the expected residual by more than this [-].
 _ALIKE: Final = 5e-3
 
 
@@ -99,7 +99,7 @@ class Decision(NamedTuple):
 
     @property
     def needs_better_record(self) -> bool:
-        """True if the pair cannot be used for a cause that holds for each pair of the record."""
+        """True if the pair cannot be used for a reason that applies to every pair of the record."""
         causes = self.quality.causes
         return self.grade == POOR and any(cause.is_of_record for cause in causes)
 
@@ -120,7 +120,7 @@ class Decision(NamedTuple):
         if self.objections:
             return "; ".join(self.objections)
         if self.grade == POOR and self.quality.grade != POOR:
-            # The error makes the pair inadmissible, however little it matters in the next contact.
+            # The error makes the pair inadmissible, however little it affects the next contact.
             return "; ".join(self.quality.alone.reasons)
         if self.at_rest and not self.quality.reasons:
             return "nothing vibrates in the flight up to td"
@@ -133,7 +133,7 @@ class Decision(NamedTuple):
 
     @property
     def general_reason(self) -> str:
-        """Reason for a verdict other than "use", without numbers, so that several pairs can share it."""
+        """Reason for a verdict other than "use", without numbers, so that several pairs can share the reason."""
         if self.objections:
             return "; ".join(self.objections)
         if self.grade == POOR and self.quality.grade != POOR:
@@ -149,7 +149,7 @@ class Decision(NamedTuple):
 
     @property
     def is_limited_by_raised_grade(self) -> bool:
-        """True if the vibration grade determines the verdict although it was raised because of a negligible error."""
+        """True if the vibration grade decides the verdict after it was raised because of a negligible error."""
         vibration = self.quality.vibration
         is_raised = self.quality.alone.grade != vibration.grade
         return is_raised and vibration.grade == self.grade
@@ -183,7 +183,7 @@ class Decision(NamedTuple):
 
     @property
     def worst_case(self) -> str:
-        """Description of the worst motion after td that is consistent with the record."""
+        """Description of the worst motion after td that the record does not rule out."""
         if self.at_rest:
             return "the same"
         if self.residual is None:
@@ -211,7 +211,7 @@ class Decision(NamedTuple):
         return join_cures(map(self.specify_cure, self.quality.causes))
 
     def specify_cure(self, cause: Cause) -> str:
-        """Return the advice that removes a cause; other times are not advised if the pair is the best of a td range."""
+        """Return the advice that removes a cause. If the pair is the best of a td range, no other times are advised."""
         if self.best_of is None or not cause.needs_other_times:
             return cause.cure
         low, high = self.best_of
@@ -221,7 +221,7 @@ class Decision(NamedTuple):
 
 
 def join_cures(cures: Iterable[str]) -> str:
-    """Join cures, each once and without those that another one begins with.
+    """Join cures, each only once, and omit those with which a longer cure begins.
 
     Examples
     --------
@@ -247,7 +247,7 @@ def decide(
     is_admissible: bool = True,
     best_residual: float | None = None,
 ) -> Decision:
-    """Return the verdict on a tr; any of the ``objections`` makes it inadmissible, and ``better`` is a better pair.
+    """Return the verdict on a tr, which any of the ``objections`` makes inadmissible; ``better`` is a better pair.
 
     ``is_admissible`` False does so without objections, if they say nothing but that the residual is too large.
     ``best_residual`` is that of the best tr at this td [-]: if it is clearly smaller, tr is to blame.  If there is no
@@ -270,7 +270,7 @@ def decide(
 
 
 def _find_worst_residual(situation: Situation, candidate: Candidate) -> float:
-    """Return the largest residual that is consistent with the record [-]; 0 if nothing vibrates.
+    """Return the largest residual that the record does not rule out [-]; 0 if nothing vibrates.
 
     If the direction of the deformation is unknown, it is that of equal levels with opposite signs.
     """
@@ -282,7 +282,7 @@ def _find_worst_residual(situation: Situation, candidate: Candidate) -> float:
 
 
 def _explain_why_good(quality: Quality, residual: float | None) -> str:
-    """Explain why a pair is good: its vibration is preserved, or the error of its vibration hardly matters."""
+    """Explain why a pair is good: it preserves the vibration, or the error of its vibration hardly matters."""
     if quality.alone.grade == GOOD:
         error = (
             "" if residual is None else f" with an error of {format_residual(residual)}"
@@ -292,7 +292,7 @@ def _explain_why_good(quality: Quality, residual: float | None) -> str:
 
 
 def _explain_raised_grade(quality: Quality) -> str:
-    """Explain why the error of the vibration hardly matters; empty if this did not raise the grade."""
+    """Explain why the vibration error hardly matters; empty if this did not raise the grade."""
     if quality.worth is None or quality.alone.grade == quality.vibration.grade:
         return ""
     share = quality.worth.share
@@ -301,13 +301,13 @@ def _explain_raised_grade(quality: Quality) -> str:
 
 
 def format_bounds(bounds: MeanEnergyBounds) -> str:
-    """Format the bounds of the mean energy, as a single number if both have the same digits."""
+    """Format the bounds of the mean energy, or a single number if both bounds have the same digits."""
     low, high = f"{bounds.low:.0%}", f"{bounds.high:.0%}"
     return low if low == high else f"{low} to {high}"
 
 
 def _describe_pair(pair: Pair) -> str:
-    """Describe a pair by its times, with its residual if that is known."""
+    """Describe a pair by its times and, if known, by its residual."""
     times = f"tr = {pair.tr:.6g}, td = {pair.td:.6g}"
     if pair.residual is None:
         return times

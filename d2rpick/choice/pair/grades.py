@@ -1,4 +1,4 @@
-"""Define the grades of a pair and their verdicts, without importing numpy, which only the grading itself needs."""
+"""Define the grades of a pair and their verdicts, without importing numpy, which only the grading needs."""
 
 from __future__ import annotations
 

@@ -34,32 +34,32 @@ if TYPE_CHECKING:
     from d2rpick.flight.flight import Flight
     from d2rpick.histories.history import History, Samples
 
-# Deformation errors that exceed the smallest one by at most this are treated as equal [-].
+# Deformation errors that exceed the smallest error by at most this are treated as equal [-].
 EQUALLY_GOOD = 0.02
-# Level errors of pairs that differ by at most this are treated as equal [-].
-# Smaller level differences do not matter, because the level predicts the mean energy after td to 10 % at best.
+# Pairs whose level errors differ by at most this are treated as equal [-].
+# Smaller level differences do not matter, because a level predicts the mean energy after td to 10 % at best.
 LIKE_LEVELS = TOLERATED_GROWTH
-# Largest level error that rounding causes at a crossing, for levels above this fraction of the highest energy [-].
+# Largest level error due to rounding at a crossing, if the level exceeds this fraction of the highest energy [-].
 ROUNDING: Final = 1e-3
 # Number of decimals to which errors are rounded before comparison, so that round-off does not affect the ranking.
 _DECIMALS: Final = 4
-# Rigid times that are shorter than the longest one by at most this fraction are treated as equal [-].
+# Rigid times that are shorter than the longest rigid time by at most this fraction are treated as equal [-].
 LIKE_TIMES = 0.1
 
 # Largest residual of a good pair [-], which is also the default tolerance for tr.
 MOST_GOOD = 0.2
 # Largest upper bound of the residual of a good pair [-]; the bound includes modes hidden in the misfit.
 _MOST_HIDDEN: Final = 0.3
-# Smallest deviation by which the energy is treated as above or below its mean, in standard deviations [-].
+# The energy is treated as above or below its mean if it deviates by at least this number of standard deviations [-].
 _BAND: Final = 0.25
 # The following limits of the vibration error are explained in docs/explanation/validation-vibration.md.
 # _HARDLY_GOOD: largest vibration-error energy of a good pair, relative to the energy of the next contact [-].
 # MOST_WORTH_OF_FAIR: largest vibration-error energy of a fair pair, relative to the energy of the next contact [-].
 _HARDLY_GOOD: Final = 0.01
 MOST_WORTH_OF_FAIR: Final = 0.05
-# Smallest number of states that resolve a flight; for fewer states, a shorter output interval is proposed.
+# Smallest number of states that resolve a flight; if there are fewer, a shorter output interval is proposed.
 _ENOUGH_STATES: Final = 200
-# With at least this many states up to td, a cure is proposed other than more states.
+# If at least this many states lie before td, more states are not proposed as the cure.
 _FEW_STATES: Final = 20
 # Largest number of parts that are named in a sentence.
 _NAMED: Final = 5
@@ -67,21 +67,25 @@ _WRONG_BY_MORE: Final = "the vibration after td is wrong by more than"
 _MORE_OFTEN: Final = "write the energies more often"
 CHOOSE_TIMES_IN_FLIGHT: Final = "choose tr and td in one flight"
 _CORRECT_THE_DECK: Final = "correct the deck, and run the reference again"
-# End of the advice on a pair; it is omitted if the finished switched run is already available.
+_CHECK_GIVEN_TIMES: Final = (
+    "make sure that no force acts in the flight that you gave, "
+    "or let the evidence decide, without `after` and `landing`"
+)
+# End of the advice on a pair, which is omitted if a finished switched run is already available.
 _OR_COMPARE: Final = ", or compare with a finished switched run"
 
 
 def rank_candidates(
     situations: Sequence[Situation], *, in_flight: bool = False
 ) -> Iterator[Candidates]:
-    """Yield the ranked candidates for each td of a record, with the recommended candidate."""
+    """Yield the ranked candidates and the recommended candidate for each td of a record."""
     return chain.from_iterable(
         map(rank_judged, judge_candidates(situations, in_flight=in_flight))
     )
 
 
 def rank_judged(judged: Judged) -> Iterator[Candidates]:
-    """Rank and number the candidates of each td, and recommend the first that meets the limits of the settings.
+    """Rank and number the candidates of each td, and recommend the first candidate within the limits of the settings.
 
     Acceptable candidates come first; of these, those on the swing of td or near td come last, since they save little.
     In each group those of like quality come first, the earliest first; but among rigid times within 10 % of the
@@ -125,7 +129,7 @@ def get_limit_of_like_quality(situation: Situation) -> float:
 
 
 def is_good_residual(residual: Samples, highest: Samples) -> NDArray[np.bool_]:
-    """Return True for each good pair, given its residual and its upper bound, both of shape (n,) [-]; False for NaN."""
+    """Return True for each good pair, given its residual and the upper bound, both of shape (n,) [-]; False for NaN."""
     return (residual <= MOST_GOOD) & (highest <= _MOST_HIDDEN)
 
 
@@ -166,7 +170,7 @@ def order_by_quality(
     is_off: NDArray[np.bool_],
     room: Samples,
 ) -> NDArray[np.intp]:
-    """Return the order of the candidates, group by group; each group starts with the best, equally good candidates.
+    """Return the order of the candidates, group by group. The best candidates, which are equally good, come first.
 
     These are the good ones.  If a group has no such pair, they are those with an error within ``room``, of shape
     (groups,), of the smallest, or with an expected error that the band of the best leaves open; the other arguments
@@ -211,14 +215,14 @@ def order_by_quality(
 def _find_extremes(
     extreme: np.ufunc, group: NDArray[np.int32], values: Samples, groups: int
 ) -> Samples:
-    """Return the smallest value in each group if ``extreme`` is ``np.minimum``, the largest if it is ``np.maximum``."""
+    """Return the smallest value of each group if ``extreme`` is ``np.minimum``, the largest if it is ``np.maximum``."""
     extremes = np.full(groups, np.inf if extreme is np.minimum else -np.inf)
     extreme.at(extremes, group, values)
     return extremes
 
 
 class Excess(NamedTuple):
-    """A limit that a pair exceeds, or that cannot be tested because the value is unknown, with its ``message``.
+    """A limit that a pair exceeds, or that cannot be tested because a value is unknown, with the ``message`` about it.
 
     ``is_td_wrong`` is True if the value is known and depends on td only, so that no other tr helps.
     """
@@ -230,7 +234,7 @@ class Excess(NamedTuple):
 def list_exceeded_limits(
     situation: Situation, candidate: Candidate
 ) -> tuple[Excess, ...]:
-    """Return the limits that the settings define and that a candidate exceeds or has no value for."""
+    """Return the limits in the settings that a candidate exceeds, or for which its value is unknown."""
     exceeded = []
     for limit, value in situation.settings.limits:
         of_td = limit.quantity not in candidate._fields
@@ -257,17 +261,13 @@ class Cause(NamedTuple):
 
     @property
     def general_reason(self) -> str:
-        """The reason, worded without the values of the particular pair."""
+        """The reason, worded without the values of a particular pair."""
         return self.kind or self.reason
 
 
 _NOT_CERTAIN: Final = Cause(
     "the flight is not certain",
     "write the part momenta (LS-DYNA matsum, Radioss /TH/PART), or give the end of the load as `after`",
-)
-_CHECK_GIVEN_TIMES: Final = (
-    "make sure that no force acts in the flight that you gave, "
-    "or let the evidence decide, without `after` and `landing`"
 )
 _UNKNOWN_OUTSIDE: Final = Cause(
     "the error of the vibration is unknown, because tr or td lies outside the flight",
@@ -285,7 +285,7 @@ _UNKNOWN_LOAD: Final = Cause(
     "give the deck of the run as `deck`, because it defines gravity and loads, or write the part momenta",
     is_of_record=True,
 )
-# The cause if the deck was given, and still does not explain the change.
+# The cause if the deck was given and does not explain the change either.
 _UNKNOWN_LOAD_WITH_DECK: Final = _UNKNOWN_LOAD._replace(
     cure="write the part momenta (LS-DYNA matsum, Radioss /TH/PART)"
 )
@@ -324,7 +324,7 @@ def grade_residual(residual: float) -> str:
 
 
 class Quality(NamedTuple):
-    """Two grades of a pair, for the ``motion`` and for the ``vibration`` after td. The worse of the two counts.
+    """Two grades of a pair, for the ``motion`` and for the ``vibration`` after td. The worse grade is used.
 
     ``alone`` is the grade of the vibration by itself.  ``worth`` may raise it: the energy of the vibration error
     relative to the next contact, None if that is unknown.
@@ -354,7 +354,7 @@ class Quality(NamedTuple):
 
 
 def _explain_uncertain_flight(flight: Flight) -> Cause:
-    """Return why a flight is not certain: what contradicts the times given by the user, or a lack of evidence."""
+    """Return why a flight is uncertain: what contradicts the times given by the user, or what evidence is missing."""
     if flight.source == "given" and flight.doubts:
         return Cause(
             flight.doubts[-1],
@@ -365,12 +365,12 @@ def _explain_uncertain_flight(flight: Flight) -> Cause:
 
 
 def _explain_unknown_load(situation: Situation) -> Cause:
-    """Return why a load in the flight is unknown: a missing mass, a missing deck, or missing momenta."""
+    """Return why a load in the flight is unknown: the mass, the deck or the momenta are missing."""
     history, flight = situation.history, situation.flight
     momenta = history.find_momenta(of_parts=flight.parts is not None)
     if flight.source == "momentum" and momenta and not momenta.velocity:
         mass = momenta.mass(momenta.chosen)
-        # A mass that is not in the files is NaN, or 0 in a sum.
+        # A mass that the files do not contain is NaN, or 0 in a sum.
         if not mass > 0:
             return _UNKNOWN_MASS
     return _UNKNOWN_LOAD if history.surroundings is UNKNOWN else _UNKNOWN_LOAD_WITH_DECK
@@ -379,7 +379,7 @@ def _explain_unknown_load(situation: Situation) -> Cause:
 def grade_pair(
     situation: Situation, best: Candidate, best_residual: float | None = None
 ) -> Quality:
-    """Grade a tr by its motion, by its vibration error, and by that error relative to the next contact.
+    """Grade a tr by its motion, its vibration error, and this error relative to the next contact.
 
     ``best_residual`` is that of the best tr at this td [-], None if it is unknown or if this is the best tr.
     """
@@ -441,7 +441,7 @@ def _list_causes_for_poor(
 
 
 def _describe_unknown_direction(situation: Situation) -> Cause:
-    """Return the cause "the directions of the deformation at tr and td are unknown", with its ``cure``."""
+    """Return the cause that the directions of the deformation at tr and td are unknown, with its ``cure``."""
     refusal = situation.evidence.refusal
     why = f": {refusal}" if refusal else ""
     unknown = "it is unknown whether the parts are deformed in the same direction at tr and td"
@@ -464,7 +464,7 @@ def _describe_unknown_direction(situation: Situation) -> Cause:
 
 
 def omit_comparison(quality: Quality) -> Quality:
-    """Return the grades without the advice to compare with a finished switched run, since this has been done."""
+    """Return the grades without the advice to compare with a finished switched run, because that has been done."""
 
     def omit(grade: Grade) -> Grade:
         causes = [
@@ -492,7 +492,7 @@ def _count_states(situation: Situation) -> int:
 
 
 def _ask_for_more_states(situation: Situation) -> Iterator[str]:
-    """Yield a request for a shorter output interval if too few states lie in the flight up to td."""
+    """Yield a request for a shorter output interval if the flight has too few states up to td."""
     begin = _get_begin(situation)
     states = _count_states(situation)
     if states < _ENOUGH_STATES and situation.td > begin:
@@ -504,7 +504,7 @@ def _ask_for_more_states(situation: Situation) -> Iterator[str]:
 
 
 def _describe_cure_for_modes(situation: Situation) -> str:
-    """Return the cure that would reveal the modes of the vibration: other parts, or more states."""
+    """Return the cure that would show the modes of the vibration: other parts or more states."""
     other_parts = situation.together.not_chosen.parts
     if situation.history.parts is None and not other_parts:
         return "name the parts to be switched with `parts`, if the files contain parts"
@@ -518,7 +518,7 @@ def _describe_cure_for_modes(situation: Situation) -> str:
 def _describe_wrong_tr(
     candidate: Candidate, residual: float, best_residual: float | None
 ) -> Cause | None:
-    """Return the cause "tr does not match td" if the best tr at this td is clearly better; otherwise None."""
+    """Return the cause that tr does not match td if the best tr at this td is clearly better; otherwise None."""
     if best_residual is None or residual - best_residual <= EQUALLY_GOOD:
         return None
     reason = f"the vibration after td is wrong by {format_residual(residual)}, because tr does not match td"
@@ -562,7 +562,7 @@ def _describe_wrong_vibration(situation: Situation, residual: float) -> Cause:
 def _list_causes_of_record(
     history: History, start: float | None, td: float
 ) -> tuple[Cause, ...]:
-    """Return the reasons why the states of the flight up to td are insufficient to determine the energy level."""
+    """Return the reasons why the states of the flight up to td do not suffice to determine the energy level."""
     _, energy = history.between(-np.inf if start is None else start, td)
     causes = []
     if energy.size and energy.min() < MIN_PLASTIC * np.abs(energy).max():
@@ -595,7 +595,7 @@ def rate_certainty_of_tr(best: Candidate) -> int:
 
 
 def _is_loose(best: Candidate) -> bool:
-    """Return True if tr is not accurate enough for a good pair: the frozen-deformation error may be too large."""
+    """Return True if tr is so inaccurate that the frozen-deformation error may be too large for a good pair."""
     if best.tr_high is None or best.timing_tolerance is None:
         return False
     return (
@@ -607,12 +607,14 @@ def _list_causes_for_fair(situation: Situation, best: Candidate) -> list[Cause]:
     """Return the causes of the vibration grade "fair"."""
     if best.residual is None:
         return []
+    low = best.residual if best.residual_low is None else best.residual_low
     high = best.residual_high or best.residual
     causes = []
-    if best.residual > MOST_GOOD:
-        worst_text = (
-            f", or {format_residual(high)} at worst" if high > _MOST_HIDDEN else ""
-        )
+    is_vague = high > _MOST_HIDDEN
+    # A residual that is stated above the limit, but may be below it by its band, does not make a pair worse than good.
+    is_wrong = best.residual > MOST_GOOD and (is_vague or low > MOST_GOOD)
+    if is_wrong:
+        worst_text = f", or {format_residual(high)} at worst" if is_vague else ""
         causes.append(
             Cause(
                 f"the vibration after td is wrong by {format_residual(best.residual)}{worst_text}",
@@ -621,7 +623,7 @@ def _list_causes_for_fair(situation: Situation, best: Candidate) -> list[Cause]:
                 kind=f"{_WRONG_BY_MORE} {MOST_GOOD:.0%}",
             )
         )
-    elif high > _MOST_HIDDEN:
+    elif is_vague:
         causes.append(
             Cause(
                 f"the vibration after td may be wrong by up to {format_residual(high)}, because the record may hide a "
@@ -630,7 +632,7 @@ def _list_causes_for_fair(situation: Situation, best: Candidate) -> list[Cause]:
                 kind="the record may hide a further mode",
             )
         )
-    if best.residual <= MOST_GOOD and _is_loose(best):
+    if not is_wrong and _is_loose(best):
         reach = (best.tr_high or best.tr) - best.tr
         causes.append(
             Cause(

@@ -47,11 +47,11 @@ if TYPE_CHECKING:
 
 # Assumed upper bound of the error in energies from the solver, as a fraction of the highest energy [-].
 _SOLVER_ERROR: Final = 1e-5
-# Largest energy fluctuation that is ignored, as a fraction of the largest vibration energy after the load [-].
+# Energy fluctuations up to this fraction of the largest vibration energy after the load are ignored [-].
 _FAINT: Final = 1e-4
-# No modes are fitted if an oscillator describes at least this fraction of the record [-].
+# If an oscillator describes at least this fraction of the record, no modes are fitted [-].
 _MOST_OF_RECORD: Final = 0.5
-# Rounding error of a printed energy, in units of its last digit [-].
+# Rounding error of a printed energy, in units of the last printed digit [-].
 # Two units are assumed, because a constant energy may alternate between two printed values.
 _QUANTA: Final = 2
 
@@ -70,7 +70,7 @@ def is_at_rest(
     start, end = flight
     last = td if end is None else max(td, end - LEAST_MARGIN * (end - start))
     _, inside = history.between(start, last)
-    # So few samples cannot show a vibration.
+    # This number of samples is too small to show a vibration.
     if inside.size < MIN_SAMPLES_PER_PERIOD:
         return False
     # The rounding error is 0 if no energy is written at all.
@@ -83,7 +83,7 @@ def is_at_rest(
 
 
 def _find_faint_fluctuation(history: History, start: float) -> float:
-    """Return the largest energy fluctuation at which the flight is treated as free of vibration [energy].
+    """Return the largest energy fluctuation in a flight that is treated as free of vibration [energy].
 
     This limit is the largest of the solver error, the printed digits, and a small share of the energy that falls after
     the ``start`` of the flight [time].  At least the energy that falls was elastic, since plastic work stays.
@@ -128,13 +128,13 @@ class AnswerAtTd:
 
     @property
     def kinetic_share(self) -> float | None:
-        """Kinetic fraction K at td [-], which no tr preserves; None on basis ``"energy"`` and at rest."""
+        """Kinetic fraction K at td [-], which no tr preserves; None on basis ``"energy"`` or if nothing vibrates."""
         return self.situation.kinetic_share
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Situation:
-    """A history for one td [time], with the flight and the vibration around td.
+    """A history at one td [time], with the flight and the vibration around td.
 
     ``evidence`` describes the vibration that was found.
     """
@@ -152,7 +152,7 @@ class Situation:
 
     @cached_property
     def whole(self) -> Vibration:
-        """The vibration model for the energy of all chosen parts together."""
+        """The vibration model of the total energy of all chosen parts."""
         return find_energy_at(self.history, self.td, self.evidence)
 
     @property
@@ -167,7 +167,7 @@ class Situation:
 
     @property
     def kinetic_share(self) -> float | None:
-        """Kinetic fraction K [-]; None on basis "energy" and at rest."""
+        """Kinetic fraction K [-]; None if the basis is "energy" or nothing vibrates."""
         share = self.vibration.kinetic_share
         if share is None or self.at_rest:
             return None
@@ -183,13 +183,13 @@ class Situation:
 
     @property
     def latest_td(self) -> float:
-        """Latest acceptable td: end of the flight minus the margin [time]; infinite if the record shows no contact."""
+        """Latest acceptable td: the end of the flight minus the margin [time]; infinite if no contact is recorded."""
         end = self.flight.end
         return float("inf") if end is None else sum_times_as_read(end, -self.margin)
 
     @cached_property
     def margin(self) -> float:
-        """Time kept free before the next contact [time]; 0 if the user gives td but neither margin nor landing."""
+        """Time kept free before the next contact [time]; 0 if the user gives td but neither a margin nor a landing."""
         if self.settings.margin is None and self.settings.landing is not None:
             return self.expected_margin.time
         return self.settings.margin or 0.0
@@ -201,7 +201,7 @@ class Situation:
 
     @cached_property
     def expected_margin(self) -> Margin:
-        """Margin for a td chosen by the program: the given margin, or how much earlier the contact may occur."""
+        """Margin for a td that the program chooses: the given margin, or how much earlier the contact may occur."""
         return find_margin(self.history, self.flight, self.settings)
 
     @cached_property
@@ -216,7 +216,7 @@ class Situation:
 
     @cached_property
     def bodies(self) -> Bodies | None:
-        """Drift of the rigid bodies that the parts become in the flight; None if there are no part data."""
+        """Drift of the rigid bodies that the parts become in the flight; None if no part data exist."""
         return find_drift_of_bodies(self.history, self.flight, self.settings)
 
     def position_errors(self, times: Samples) -> Samples:
@@ -231,20 +231,20 @@ class Situation:
 
     @property
     def most_error(self) -> float:
-        """Largest acceptable error of a tr [-]: the tolerance or, if there are many modes, the limit of their model."""
+        """Largest acceptable error of a tr [-]: the tolerance or, for many modes, the limit of the modal model."""
         limit = self.vibration.most_lock_in
         return self.settings.tolerance if limit is None else limit
 
     @property
     def in_flight(self) -> bool:
-        """True if td lies in a known flight, at least the margin before its end."""
+        """True if td lies in a known flight and keeps the margin before its end."""
         return (
             self.earliest_tr is not None
             and self.earliest_tr < self.td <= self.latest_td
         )
 
     def peaks(self, start: float, end: float) -> tuple[float, ...]:
-        """Return the times of the energy peaks in (start, end], ascending, from the oscillator or the samples."""
+        """Return the ascending times of the energy peaks in (start, end], from the oscillator or the samples."""
         return describe_energy_at(self.history, self.td, self.evidence).peaks(
             start, end
         )
@@ -268,7 +268,7 @@ def examine_td(
     *,
     quick: bool = False,
 ) -> Situation:
-    """Find the flight around ``td`` and its vibration; results that many td share are computed once per history.
+    """Find the flight around ``td`` and its vibration. Results that many td share are computed once per history.
 
     Use ``quick`` for a choice among many td: an oscillator that describes most of the record, including td, is not
     searched for again, and the misfit of a refused oscillator is not computed.
@@ -362,7 +362,7 @@ def _find_other_models(situation: Situation) -> dict[str, SignedModel]:
         # Imported here to keep start-up fast.
         from d2rpick.vibration.modal_span import get_inner_window
 
-        # The energy shows a slightly different flight for each td, so modes are fitted in windows shared by many td.
+        # The energy shows a slightly different flight for each td, so modes are fitted in windows that many td share.
         inner = get_inner_window(history, in_flight)
         in_flight = inner if inner.start < situation.td <= inner.end else in_flight
     return find_models(history, in_flight, settled, together=situation.together)
@@ -393,7 +393,7 @@ def _limit_start(situation: Situation, since: float) -> Situation:
 
 
 def _get_bounds(history: History, seen: Seen) -> Span:
-    """Return the bounds of the flight according to the evidence; without evidence, those of the whole record [time]."""
+    """Return the bounds of the flight according to the evidence; if there is none, those of the whole record [time]."""
     if seen.flight:
         return Span(seen.flight.start, seen.flight.end)
     return Span(history.start, history.end)
@@ -417,7 +417,7 @@ def _covers_most(history: History, described: Described | None) -> bool:
 def _choose_longer_window(
     by_oscillator: Described | None, modes: ModalWindow | None
 ) -> Described | None:
-    """Return the window that an oscillator describes, or a longer one that modes describe; None if there is neither.
+    """Return the window that an oscillator describes, or a longer window that modes describe; None if there is neither.
 
     Modes follow a mean energy that drifts, so they describe long windows in which an oscillator soon misses it.  Only
     modes that leave hardly anything go over the end of an oscillator's window, for a contact may have ended it.

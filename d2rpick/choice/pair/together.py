@@ -20,7 +20,7 @@ class PartsTogether:
 
     @cached_property
     def not_chosen(self) -> Beside:
-        """Parts that vibrate together with the chosen parts, but were not chosen."""
+        """Parts that vibrate together with the chosen parts but were not chosen."""
         # Imported here to keep start-up fast.
         from d2rpick.flight.vibrating import (
             find_vibrating_parts,
@@ -35,7 +35,7 @@ class PartsTogether:
 
     @property
     def kinetic(self) -> tuple[Samples, Samples] | None:
-        """Times in the flight and kinetic energies of the parts that vibrate together; None if they are not written."""
+        """Times in the flight and kinetic energies of the parts that vibrate together; None if not written."""
         # Imported here to keep start-up fast.
         from d2rpick.flight.vibrating import (
             extract_kinetic_energy,

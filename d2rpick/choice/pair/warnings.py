@@ -1,4 +1,4 @@
-"""Warn about a td, estimate the motion after it from the energy alone, and list the objections to a tr.
+"""Warn about a td, estimate the motion after td from the energy alone, and list the objections to a tr.
 
 Warnings have stable codes for scripts, and sentences for users.
 """
@@ -36,20 +36,20 @@ if TYPE_CHECKING:
     from d2rpick.histories.names import Part
     from d2rpick.vibration.measures import Columns
 
-# Modes of higher frequency can be detected only with at least this number of states per energy period.
+# Modes of higher frequency are detected only if each energy period has at least this number of states.
 _FEW_STATES = 4
 # Kinetic fraction at td above which every tr loses more than half of the vibration energy [-].
 POOR_KINETIC_SHARE = 0.5
-# Largest residual of a pair that is not poor [-]; at this value, the error has 25 % of the vibration energy.
+# Largest residual of a pair that is not poor [-]. At this value, the error has 25 % of the vibration energy.
 POOR_RESIDUAL = 0.5
-# Largest plastic energy without a warning, as a fraction of the vibration energy [-]; it may be a preload.
+# Plastic energy up to this fraction of the vibration energy causes no warning [-], because it may be a preload.
 _NOTABLE_PLASTIC = 0.05
 
-# Assumed ratio of the static energy to the lowest energy in flight [-]; modes rarely all have zero energy at once.
-# With _AT_REST = 0.85, the predicted mean energies after td had errors of up to 0.03 in 12 switched runs of a car.
-# With _AT_REST = 0.85, the predicted mean energies of a shell box had errors of -0.05 to 0.16.
+# Assumed ratio of the static energy to the lowest energy in flight [-]; modes rarely all reach zero energy at once.
+# With _AT_REST = 0.85, the predicted mean energies after td were wrong by up to 0.03 in 12 switched runs of a car.
+# With _AT_REST = 0.85, the predicted mean energies of a shell box were wrong by -0.05 to 0.16.
 _AT_REST = 0.85
-# Largest expected mean energy after td relative to the reference run [-]; above 1 because estimates are inexact.
+# Largest expected mean energy after td relative to the reference run [-]; it exceeds 1 because estimates are inexact.
 # Switching adds no energy, so a ratio above MOST_KEPT indicates a contact in the flight.
 MOST_KEPT = 1.2
 # Largest argument for which the exponential function does not overflow [-].
@@ -57,7 +57,7 @@ _LARGEST_EXPONENT = 700.0
 
 
 def warn_about_td(situation: Situation) -> Iterator[Caution]:
-    """Yield all warnings about the td of a situation; warnings about the input come first."""
+    """Yield all warnings about the td of a situation, beginning with those about the input."""
     if not situation.history.complete:
         end = float(situation.history.time[-1])
         yield Caution(
@@ -112,7 +112,7 @@ def _warn_about_energy(situation: Situation) -> Iterator[Caution]:
 
 
 def _warn_about_model(situation: Situation) -> Iterator[Caution]:
-    """Yield the warnings about the number of states, and about an estimated kinetic fraction."""
+    """Yield the warnings about the number of states and about an estimated kinetic fraction."""
     vibration = situation.vibration
     states = situation.evidence.states_per_period
     if vibration.basis == "modal" and states is not None and states < _FEW_STATES:
@@ -158,7 +158,7 @@ def _warn_about_flight(situation: Situation) -> Iterator[Caution]:
         text = "no end of the load is found in the record"
         is_given = situation.settings.after is not None or flight.refusal
         yield Caution("no-flight", text if is_given else f"{text}; give it as `after`")
-    # If the flight is refused, the reason for the refusal already contains this warning.
+    # If the flight is refused, the reason for its refusal already contains this warning.
     elif td <= earliest and not flight.refusal:
         yield Caution(
             "td-in-load",
@@ -174,7 +174,7 @@ def _warn_about_flight(situation: Situation) -> Iterator[Caution]:
 
 
 def _warn_about_grazing(situation: Situation) -> Iterator[Caution]:
-    """Yield a warning with the earliest contact time if the body only grazes in the contact that ends the flight."""
+    """Yield a warning with the earliest contact time if the contact that ends the flight is only grazing."""
     flight = situation.flight
     margin = situation.expected_margin
     if flight.end is None or flight.refusal or margin.source != "grazing":
@@ -204,7 +204,7 @@ def _warn_about_unknown_rotation(situation: Situation) -> Iterator[Caution]:
 
 
 def _describe_early_contact(situation: Situation) -> str:
-    """Describe how much earlier the contact may occur, and the last safe td."""
+    """Describe how much earlier the contact may occur, and give the last safe td."""
     start, end = situation.flight.within(situation.history.time)
     early = min(situation.expected_margin.time, end - start)
     if early < end - start:
@@ -296,7 +296,7 @@ def _describe_moving_apart(parts: Sequence[Part]) -> str:
 def _describe_not_predicted(
     bodies: Sequence[RigidBody], unknown: Sequence[RigidBody]
 ) -> str:
-    """Describe the first body whose position error is unknown, and the reason."""
+    """Describe the first body with an unknown position error, and the reason why it is unknown."""
     first = unknown[0]
     others_text = f", and of {len(unknown) - 1} more" if len(unknown) > 1 else ""
     why = "" if first.whole else ", because its pieces are not connected"
@@ -320,7 +320,7 @@ def _describe_margin(margin: float | None) -> str:
 
 
 def _describe_nearest_flight(situation: Situation) -> str:
-    """Describe the flight nearest to td, and the last td in it that keeps the margin."""
+    """Describe the flight nearest to td and the last td in this flight that keeps the margin."""
     flight = situation.flight
     if flight.start is None or flight.source == "given":
         return ""
@@ -335,7 +335,7 @@ def _describe_nearest_flight(situation: Situation) -> str:
 
 
 class Expectation(NamedTuple):
-    r"""Estimates of the motion after td for a vibration with many modes; the fields are the keys of the JSON output.
+    r"""Estimates of the motion after td for a vibration with many modes. The fields are the keys of the JSON output.
 
     Such a vibration shares its energy equally between internal and kinetic energy.  The locked-in energy above the
     energy at rest :math:`E_s` comes back as vibration that is shared in the same way:
@@ -384,17 +384,17 @@ class Means(NamedTuple):
     mean_after: float
 
     def ratio(self, locked: float) -> float:
-        """Return the mean energy after td relative to the reference run [-], if ``locked`` [energy] is locked in."""
+        """Return the mean energy after td relative to the reference run [-] if the energy ``locked`` is locked in."""
         return (self.resting + (locked - self.resting) / 2) / self.mean_after
 
     @property
     def largest_locked_in(self) -> float:
-        """Largest locked-in energy for which the energy after td is no higher than in the reference run [energy]."""
+        """Largest locked-in energy that does not raise the energy after td above that of the reference run [energy]."""
         return self.resting + 2 * (MOST_KEPT * self.mean_after - self.resting)
 
 
 def compute_means(situation: Situation) -> Means | None:
-    """Compute the energies of the flight; None if the basis is not "energy", or if nothing flies or vibrates."""
+    """Compute the energies of the flight; None if the basis is not "energy" or if nothing flies or vibrates."""
     if situation.basis != "energy":
         return None
     mean = compute_mean_in_flight(situation)
@@ -418,7 +418,7 @@ def find_largest_energy(situation: Situation) -> float:
 def estimate_time_after(
     situation: Situation, energy_tr: float | None
 ) -> Expectation | None:
-    """Estimate the motion after td; None if the basis is not "energy", or if the flight or the energy is unknown.
+    """Estimate the motion after td; None if the basis is not "energy" or if the flight or the energy is unknown.
 
     ``energy_tr`` is the energy that the recommended tr locks in [energy], None if there is no tr.
     """
@@ -449,7 +449,7 @@ def compute_mean_decay(situation: Situation, time: Samples) -> float:
 
 
 def select_energies_in_flight(situation: Situation) -> tuple[Samples, Samples]:
-    """Return times and energies of the flight, up to td if its end is unknown; empty if its start is unknown."""
+    """Return times and energies of the flight, or of its part up to td if its end is unknown; empty if unknown."""
     start = situation.flight.start
     end = situation.flight.end
     return situation.history.between(
@@ -458,7 +458,7 @@ def select_energies_in_flight(situation: Situation) -> tuple[Samples, Samples]:
 
 
 def compute_shortfall(energy: Samples, mean: float) -> Samples:
-    """Return the relative difference of a locked-in amplitude from the largest amplitude, 1 - sqrt(E/(2 <E>)) [-].
+    """Return the relative difference between a locked-in amplitude and the largest one, 1 - sqrt(E/(2 <E>)) [-].
 
     The shortfall is infinite for larger energies, which must not be locked in.
 
@@ -473,7 +473,7 @@ def compute_shortfall(energy: Samples, mean: float) -> Samples:
 
 
 class Objection(NamedTuple):
-    """An objection that applies to each candidate for which ``holds``, shape (n,), is True.
+    """An objection to each candidate for which ``holds``, shape (n,), is True.
 
     ``describe`` returns its text for a candidate by index.  Since answers are pickled with it, it is a function of
     this module with some of its arguments.  ``is_of_error``: it only says that an error is too large, as the residual
@@ -526,7 +526,7 @@ def list_objections(
     ]
     same_sign = (columns["sign_match"] != 0) | modal
     yield Objection(
-        # Before the flight no model is expected to describe the vibration, so that is no second objection.
+        # Before the flight, no model is expected to describe the vibration, so a missing model is no second objection.
         moves & ~described & ~is_early,
         partial(_tell_undescribed, situations, situation_of),
     )
@@ -602,14 +602,14 @@ def _object_to_energy(
 
 
 def _get_first_tr(situation: Situation) -> float:
-    """Return the earliest tr, rounded to printed digits [time]; NaN if it is unknown."""
+    """Return the earliest tr, rounded to printed digits [time]; NaN if the earliest tr is unknown."""
     if situation.earliest_tr is None:
         return np.nan
     return round_to_first_as_read(situation.earliest_tr)
 
 
 def list_times_outside_flight(situation: Situation, tr: float) -> list[str]:
-    """Return descriptions of the times of a pair that lie outside the flight or less than the margin before its end."""
+    """Describe the times of a pair that lie outside the flight, or less than the margin before its end."""
     outside = []
     if tr < _get_first_tr(situation):
         outside.append(_describe_in_load(situation))
@@ -635,7 +635,7 @@ def _tell_against_td(
 def _tell_undescribed(
     situations: Sequence[Situation], situation_of: NDArray[np.int32], candidate: int
 ) -> list[str]:
-    """Return the objection that no model describes the vibration at a candidate."""
+    """Return the objection that no model describes the vibration at the time of a candidate."""
     return [situations[situation_of[candidate]].vibration.undescribed]
 
 
@@ -660,7 +660,7 @@ def _tell_keeps_nothing(
     residual: Samples,
     candidate: int,
 ) -> list[str]:
-    """Return the objection that a candidate's residual exceeds that of a release without any vibration."""
+    """Return the objection that the residual of a candidate exceeds that of a release without any vibration."""
     return [
         _describe_keeps_nothing(
             situations[situation_of[candidate]], residual[candidate]
@@ -686,7 +686,7 @@ def _describe_in_load(situation: Situation) -> str:
 
 
 def _describe_keeps_nothing(situation: Situation, residual: float) -> str:
-    """State that the residual of a pair exceeds that of a release without vibration, or the smallest one at this td."""
+    """State that a pair's residual exceeds that of a release without vibration, or the smallest residual at this td."""
     smallest = situation.vibration.least_residual or 0.0
     better = f"{NOTHING_KEPT:g}, the residual of a release without any vibration"
     if situation.vibration.keeps_nothing:

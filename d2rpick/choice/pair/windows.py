@@ -8,7 +8,7 @@ import numpy as np
 
 from d2rpick.choice.pair.candidates import Candidate, Candidates, judge_times
 from d2rpick.choice.pair.warnings import find_largest_energy
-from d2rpick.histories.samples import find_crossings, merge_times, narrow_brackets
+from d2rpick.histories.samples import find_crossings, halve_brackets, merge_times
 from d2rpick.vibration.measures import TOLERATED_GROWTH
 
 if TYPE_CHECKING:
@@ -22,9 +22,9 @@ if TYPE_CHECKING:
     # A function that tests times and returns True for each time that passes.
     Keeps = Callable[[Samples], NDArray[np.bool_]]
 
-# Largest number of halvings of a sampling interval; they locate the end of a window to 1e-6 of the interval.
+# Largest number of halvings of a sampling interval, which locate the end of a window to 1e-6 of the interval.
 _HALVINGS: Final = 20
-# A level lies below the highest energy by this fraction, so that rounding does not hide the crossing [-].
+# A level is placed below the highest energy by this fraction, so that rounding does not hide the crossing [-].
 _BELOW: Final = 1e-12
 
 # Largest deviation of the error from its polyline [-], which is half a unit of the last printed digit.
@@ -73,7 +73,7 @@ def find_acceptable_windows(
 
 
 def cut_before_td(situation: Situation, windows: Samples) -> Samples:
-    """Truncate the windows one output interval before td, because a later tr saves nothing."""
+    """End the windows one output interval before td, because a later tr saves nothing."""
     time = situation.history.time
     state = int(np.searchsorted(time, situation.td))
     end = situation.td - float(time[state] - time[state - 1])
@@ -118,7 +118,7 @@ def find_alike_windows(
 def count_coverage(
     runs: Sequence[Samples],
 ) -> tuple[Samples, np.ndarray[tuple[int], np.dtype[np.intp]]]:
-    """Count, for each time, the runs with a window that contains the time.
+    """Count, for each time, the runs that have a window with this time.
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ def count_coverage(
     order = np.lexsort((-steps, times))
     counts = np.cumsum(steps[order])[:-1]
     stretches = np.stack([times[order][:-1], times[order][1:]], axis=1)
-    # There is no gap between two windows if one starts at the time at which the other ends.
+    # Two windows have no gap between them if one starts at the time at which the other ends.
     ordered = steps[order]
     touching = (ordered[:-1] > 0) & (ordered[1:] < 0)
     lasting = (stretches[:, 0] < stretches[:, 1]) | touching
@@ -165,7 +165,7 @@ def find_common_windows(runs: Sequence[Samples]) -> Samples:
 
 
 def make_monotone_grid(situation: Situation, candidates: Candidates) -> Samples:
-    """Return times in the flight before td; the verdict on tr changes at most once between two of them [time]."""
+    """Return times in the flight before td [time]. Between two of them, the verdict on tr changes at most once."""
     history = situation.history
     td = situation.td
     start = situation.earliest_tr
@@ -189,13 +189,14 @@ def make_monotone_grid(situation: Situation, candidates: Candidates) -> Samples:
 
 
 def _make_limit_on_error(situation: Situation, level: float) -> Keeps:
-    """Return a test of times for tr: the error is at most ``level``, and the energy is at most its limit."""
+    """Return a test of times for tr: the error must not exceed ``level``, nor the energy its limit."""
     highest = find_largest_energy(situation)
 
     def has_small_error(times: Samples) -> NDArray[np.bool_]:
-        return (situation.errors(times) <= level) & (
-            situation.vibration.whole.energies(times) <= highest
-        )
+        is_small = situation.errors(times) <= level
+        if highest < np.inf:
+            is_small &= situation.vibration.whole.energies(times) <= highest
+        return np.asarray(is_small)
 
     return has_small_error
 
@@ -206,7 +207,7 @@ def _make_rule(situation: Situation) -> Keeps:
     has_limits = any(True for _ in situation.settings.limits)
 
     def keeps_rule(times: Samples) -> NDArray[np.bool_]:
-        # If nothing vibrates, any tr before td is acceptable unless td itself is not.
+        # If nothing vibrates, every tr before td is acceptable unless td itself is not.
         keeps = (
             np.ones(times.shape, np.bool_)
             if situation.at_rest
@@ -228,15 +229,15 @@ def _find_windows(grid: Samples, keeps: Keeps) -> Samples:
     if not inner.size:
         return inner
     beyond = grid[np.clip([first - 1, last + 1], 0, grid.size - 1).T]
-    return narrow_brackets(
-        lambda t: keeps(t.ravel()).reshape(t.shape), inner, beyond, steps=_HALVINGS
-    ).within
+    return halve_brackets(
+        lambda t: keeps(t.ravel()).reshape(t.shape), inner, beyond, _HALVINGS
+    )
 
 
 def make_error_profile(
     situation: Situation, candidates: Candidates, windows: Samples
 ) -> Samples:
-    """Return the error of tr in the windows as the points of a polyline that is accurate to 0.0005.
+    """Return the error of tr in the windows as the points of a polyline with an accuracy of 0.0005.
 
     Parameters
     ----------
@@ -256,20 +257,21 @@ def make_error_profile(
         return np.zeros((2, 0))
     inner = make_monotone_grid(situation, candidates)
     times = merge_times(inner[_is_inside(inner, windows)], windows)
+    errors = _compute_errors(situation, times)
     for _ in range(_HALVINGS):
         middles = (times[1:] + times[:-1]) / 2
-        middles = middles[_is_inside(middles, windows)]
-        bent = (
-            np.abs(
-                _compute_errors(situation, middles)
-                - np.interp(middles, times, _compute_errors(situation, times))
-            )
-            > _EXACT / 2
-        )
+        is_between = (times[:-1] < middles) & (middles < times[1:])
+        middles = middles[is_between & _is_inside(middles, windows)]
+        errors_between = _compute_errors(situation, middles)
+        deviations = errors_between - np.interp(middles, times, errors)
+        bent = np.abs(deviations) > _EXACT / 2
         if not bent.any():
             break
-        times = merge_times(times, middles[bent])
-    return _thin_out(times, _compute_errors(situation, times), windows)
+        times = np.append(times, middles[bent])
+        errors = np.append(errors, errors_between[bent])
+        order = np.argsort(times)
+        times, errors = times[order], errors[order]
+    return _thin_out(times, errors, windows)
 
 
 def interpolate_error(profile: Samples, time: float) -> float:
@@ -278,22 +280,24 @@ def interpolate_error(profile: Samples, time: float) -> float:
 
 
 def _compute_errors(situation: Situation, times: Samples) -> Samples:
-    """Return the residuals, or the level errors if only the energy is known, in the shape of ``times`` [-]."""
+    """Return the residuals or, if only the energy is known, the level errors, in the shape of ``times`` [-]."""
     return np.asarray(
         np.sqrt(situation.errors(times) ** 2 + (situation.kinetic_share or 0.0))
     )
 
 
-def _is_inside(times: Samples, windows: Samples) -> Samples:
-    """Return an array that is True for each time in one of the windows."""
+def _is_inside(times: Samples, windows: Samples) -> NDArray[np.bool_]:
+    """Return an array that is True for each time that lies in one of the windows."""
     window = np.searchsorted(windows[:, 0], times, side="right") - 1
     return np.asarray((window >= 0) & (times <= windows[window, 1]))
 
 
 def _thin_out(times: Samples, errors: Samples, windows: Samples) -> Samples:
     """Thin out a curve: keep the ends of windows and, between them, the points farthest from straight lines."""
-    points = np.flatnonzero(np.isin(times, windows))
+    is_kept = np.zeros(times.shape, np.bool_)
+    is_kept[np.searchsorted(times, windows)] = True
     while True:
+        points = np.flatnonzero(is_kept)
         deviations = np.abs(errors - np.interp(times, times[points], errors[points]))
         worst = np.repeat(
             np.maximum.reduceat(deviations, points), np.diff(points, append=times.size)
@@ -301,4 +305,4 @@ def _thin_out(times: Samples, errors: Samples, windows: Samples) -> Samples:
         new = np.flatnonzero((deviations == worst) & (deviations > _EXACT / 2))
         if not new.size:
             return np.stack([times[points], errors[points]])
-        points = np.union1d(points, new)
+        is_kept[new] = True

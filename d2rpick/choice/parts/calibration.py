@@ -51,7 +51,7 @@ if TYPE_CHECKING:
     from d2rpick.deck.model import Inventory
     from d2rpick.histories.history import Samples
 
-# Ratio of the assumed relative error of CPU times (5 %) to that of the assumed weight ratios (50 %) [-].
+# Ratio of the relative errors assumed for CPU times (5 %) and for weight ratios (50 %) [-].
 _DOUBT: Final = 0.1
 # Restart segments determine a weight if they contribute at least this fraction of its value [-].
 _TOLD: Final = 0.5
@@ -62,7 +62,7 @@ _US: Final = 1e6
 
 
 class Observation(NamedTuple):
-    """The CPU time per cycle of one restart segment of a run [us], and the elements and nodes computed in the segment.
+    """The CPU time per cycle of a restart segment [us], and the elements and nodes computed in the segment.
 
     ``counts`` has the number of deformable elements by class; ``elements`` is None if the solver writes the total only.
     """
@@ -90,7 +90,7 @@ class FittedWeights:
 
 
 def fit_weights(observations: Sequence[Observation]) -> FittedWeights:
-    """Fit weights to the CPU times of restart segments; parts are rigid in some of the segments.
+    """Fit weights to the CPU times of restart segments, some of which have rigid parts.
 
     Raises
     ------
@@ -173,7 +173,7 @@ def _build_equations(
 
 
 def _solve_equations(scaled: Samples) -> tuple[Samples, NDArray[np.bool_]]:
-    """Solve the non-negative least-squares problem; return all unknowns, and which of them the rows determine.
+    """Solve the non-negative least-squares problem; return all unknowns, and those that the rows determine.
 
     Undetermined unknowns stay 1.
     """
@@ -213,7 +213,7 @@ class _RigidPart(NamedTuple):
 def read_observations_of_runs(
     folders: Sequence[str],
 ) -> tuple[tuple[Observation, ...], tuple[Caution, ...]]:
-    """Read the CPU times of the restart segments of several runs; files with equal content are used once.
+    """Read the CPU times of the restart segments of several runs. Files with equal content are used only once.
 
     Raises
     ------
@@ -349,7 +349,7 @@ def _read_termination_time(deck: Deck) -> float:
 def _make_observation(
     timing: Timing, inventory: Inventory, lasting: Mapping[int, float]
 ) -> Observation:
-    """Return the observation of a restart segment; each part is rigid for its fraction ``lasting`` of the segment."""
+    """Return the observation of a restart segment. Each part is rigid for its fraction ``lasting`` of the segment."""
     counts, nodes = _count_computed(inventory, lasting)
     cycle = _US / timing.cycles
     return Observation(
@@ -365,7 +365,7 @@ def _make_observation(
 def _make_zone_observations(
     zones: ZoneTimes, inventory: Inventory, rigid: Sequence[_RigidPart]
 ) -> Iterator[Observation]:
-    """Yield one observation for each set of rigid parts: the median over the states in which these parts are rigid."""
+    """Yield an observation for each set of rigid parts: the median over the states in which these parts are rigid."""
     number = sum(counts.total() for counts in inventory.counts.values())
     states: dict[frozenset[int], list[float]] = {}
     for time, per_zone in zip(
@@ -386,7 +386,7 @@ def _make_zone_observations(
 def _count_computed(
     inventory: Inventory, lasting: Mapping[int, float]
 ) -> tuple[dict[str, float], float]:
-    """Return the average numbers of deformable elements, integration points (both by class) and rigid-body nodes."""
+    """Return the average numbers of deformable elements and integration points by class, and of rigid-body nodes."""
     always = inventory.rigid_parts
     computed: dict[str, float] = {}
     _add_counts(
@@ -419,7 +419,7 @@ def _add_counts(
     counts: Mapping[int, Mapping[str, int]],
     times: float,
 ) -> None:
-    """Add the numbers of elements of known cost to the counts by class, each multiplied by ``times``."""
+    """Add the numbers of elements of known cost, multiplied by ``times``, to the counts by class."""
     for part, kinds in counts.items():
         for kind, count in kinds.items():
             cost = inventory.formulation(part, kind).cost

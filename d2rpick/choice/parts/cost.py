@@ -1,4 +1,4 @@
-"""Model the cost of a time step, and the fraction of this cost that is saved while selected parts are rigid.
+"""Model the cost of a time step, and the fraction of the cost that is saved while selected parts are rigid.
 
 A step costs C = E / s.  E is the sum of weight x number over the computed elements, by formulation, and over their
 integration points through the thickness. s is the fraction of the elements in the cost of a step; assembly, contact and
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from d2rpick.deck.model import Inventory
     from d2rpick.deck.source import SourceFile
 
-# Cost of an element per cycle [us]; a shell costs "point" more for every integration point after the first.
+# Cost of an element per cycle [us]; each integration point of a shell after the first adds the cost "point".
 # The element costs were fitted to OpenRadioss runs of a car with 1516 elements (docs/reference/cost-model.md).
 # The costs of beams and springs are less accurate than the costs of other elements.
 POINT: Final = "point"
@@ -39,7 +39,7 @@ ELEMENT_SHARE: Final = 0.91
 # Cost per rigid-body node and cycle [us], fitted to the same runs as the element costs.
 RIGID_NODE: Final = 0.04
 _SOURCE: Final = "OpenRadioss 2026-08, one thread"
-# Upper limit of a cost, so that sums over all elements stay finite. Real costs are far smaller in any unit.
+# Upper limit of a cost, which keeps sums over all elements finite. Real costs are far smaller in any unit.
 _LARGEST: Final = 1e100
 
 # Keys with a numerical value in the TOML file of weights that ``d2rpick calibrate`` writes.
@@ -49,7 +49,7 @@ _KEYS: Final = (*_NUMBERS, "per_element", "source")
 
 @dataclass(frozen=True)
 class Weights:
-    """Cost per element and cycle by formulation or class, cost per rigid-body node, and element fraction of step cost.
+    """Cost per element and cycle by formulation or class, cost per rigid-body node, and element fraction of a step.
 
     Only ratios count: all costs have the unit of ``per_element``.  ``file`` is the file that the weights were read
     from, None if they were not read.
@@ -110,21 +110,21 @@ def compute_saved_share(
 
 
 class Amount(NamedTuple):
-    """Cost of a set of elements in the unit of the weights, and the formulations among them that have no weight."""
+    """Cost of a set of elements in the unit of the weights, and those of their formulations that have no weight."""
 
     cost: float
     unknown: tuple[str, ...] = ()
 
 
 class Share(NamedTuple):
-    """Fraction of a step's cost that is saved while the parts are rigid [-]; None with the reason if it is unknown."""
+    """Fraction of a step's cost that is saved while the parts are rigid [-]; None, with a reason, if it is unknown."""
 
     value: float | None
     reason: str | None = None
 
 
 class ByDeck(NamedTuple):
-    """Sources of the values taken from a deck: its files, and the weights (None if the user gave the cost fraction)."""
+    """Sources of the values from a deck: its files, and the weights (None if the user gave the cost fraction)."""
 
     files: tuple[SourceFile, ...]
     weights: Weights | None
@@ -156,7 +156,7 @@ class CostModel:
         )
 
     def saved(self, parts: Collection[int]) -> Share:
-        """Return the step-cost fraction saved while ``parts`` are rigid [-]; unknown if the deck lacks one of them."""
+        """Return the step-cost fraction saved while ``parts`` are rigid [-]; unknown if the deck lacks a part."""
         absent = sorted(set(parts) - self.inventory.parts.keys())
         if absent:
             return Share(
@@ -174,7 +174,7 @@ class CostModel:
 
     @property
     def assumed(self) -> tuple[str, ...]:
-        """Formulations in the deck that have no weight and are assumed to cost as much as a similar formulation."""
+        """Formulations in the deck that have no weight and are assumed to cost as much as similar formulations."""
         names: dict[str, None] = {}
         for part, counts in self.inventory.counts.items():
             if part in self._rigid:
@@ -188,7 +188,7 @@ class CostModel:
         return tuple(names)
 
     def _of(self, part: int, counts: Mapping[str, int]) -> Amount:
-        """Return the cost of elements of a part, given as counts by class."""
+        """Return the cost of elements of a part that are given as counts by class."""
         if part in self._rigid:
             return Amount(0.0)
         cost = 0.0
@@ -208,7 +208,7 @@ class CostModel:
         return Amount(cost, tuple(unknown))
 
     def _share(self, amount: Amount, value: float) -> Share:
-        """Return ``value``, a fraction of the cost, if all elements have weights; otherwise None with the reason."""
+        """Return the cost fraction ``value`` if all elements have weights; otherwise None, with the reason."""
         if not self.inventory.counts:
             return Share(None, "the deck has no elements")
         if not self.inventory.complete:
@@ -225,7 +225,7 @@ class CostModel:
 
 
 def _sum_amounts(amounts: Iterable[Amount]) -> Amount:
-    """Return the total cost, and the formulations that it omits because they have no weight."""
+    """Return the total cost, and the formulations that the sum omits because they have no weight."""
     cost = 0.0
     unknown = list[str]()
     for amount in amounts:
@@ -235,7 +235,7 @@ def _sum_amounts(amounts: Iterable[Amount]) -> Amount:
 
 
 def read_weights(path: str) -> Weights:
-    """Read weights from a TOML file. A missing element fraction or node cost gets its default.
+    """Read weights from a TOML file. Defaults replace a missing element fraction or node cost.
 
     Raises
     ------
@@ -305,7 +305,7 @@ def format_weights_as_toml(weights: Weights) -> str:
 
 
 def _quote_for_toml(text: str) -> str:
-    """Quote a string for a TOML file."""
+    """Quote a string for use in a TOML file."""
     import json
 
     # JSON escapes would contain surrogate pairs, which TOML does not allow.
@@ -318,6 +318,6 @@ def _parse_weight(path: str, name: str, value: object) -> float:
         raise ConfigurationError(f"{path}: {name} is {value!r}, a number was expected")
     try:
         return float(value)
-    # The integer has hundreds of digits, too many for a float.
+    # The integer has hundreds of digits and is too large for a float.
     except OverflowError:
         return float("inf")

@@ -1,4 +1,4 @@
-"""Apply the deck of a run: rigid bodies, supports, gravity and costs, and warnings about the deck.
+"""Apply the deck of a run: its rigid bodies, supports, gravity and costs, and warnings about the deck.
 
 If the deck belongs to another model, its part ids do not match the run, so nothing from it is used.
 """
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 def find_rigid_bodies(
     inventory: Inventory, parts: Collection[int]
 ) -> tuple[RigidBody, ...]:
-    """Return the rigid bodies that ``parts`` become; empty if their elements, or the ties between them, are unknown.
+    """Return the rigid bodies that ``parts`` become; empty if their elements or the ties between them are unknown.
 
     In LS-DYNA, which switches parts, disconnected pieces of one part become one rigid body.  In Radioss, whose rigid
     bodies are sets of nodes, each piece may have a body of its own.
@@ -95,12 +95,12 @@ def check_model_of_deck(run: OpenedRun, inventory: Inventory) -> Caution | None:
 
 
 def _has_energy(run: OpenedRun, parts: Sequence[Part]) -> bool:
-    """Return True if any of the parts has an energy in the history that is not always zero."""
+    """Return True if any of the parts has an energy in the history that differs from zero at some time."""
     return bool(parts) and bool(give_if_written(lambda: run.part_energies(parts).any()))
 
 
 def warn_about_titles(parts: Iterable[Part], inventory: Inventory) -> Iterator[Caution]:
-    """Yield a warning if part titles differ between deck and history."""
+    """Yield a warning if the part titles in deck and history differ."""
     differing = [
         part
         for part in parts
@@ -184,7 +184,7 @@ def warn_about_left_rigid(run: OpenedRun, inventory: Inventory) -> Iterator[Caut
 
 
 def warn_about_cost(model: CostModel, *, used: bool = True) -> Iterator[Caution]:
-    """Yield warnings about unread cards of a deck and, if its cost is ``used``, about assumed weights."""
+    """Yield a warning about unread cards of a deck and, if its cost is ``used``, about assumed weights."""
     for note in model.inventory.notes:
         yield Caution("deck-not-followed", note)
     if used and model.assumed:
@@ -206,7 +206,7 @@ def _get_title_in_deck(part: Part, inventory: Inventory) -> str:
 
 
 def _is_different_title(first_title: str, second_title: str) -> bool:
-    """Return True if two titles differ, ignoring spaces and case; one of the titles may be truncated.
+    """Return True if two titles differ apart from spaces and case; one title may be a truncated form of the other.
 
     Letters beyond ASCII are not compared, since the files of one run encode them in different ways.
     """
@@ -273,14 +273,14 @@ def add_deck_to_settings(
 
 
 def add_surroundings(run: OpenedRun, inventory: Inventory | None) -> OpenedRun:
-    """Return the run with the gravity, supports and connections in its deck; unchanged if it has no matching deck."""
+    """Return the run with the gravity, supports and connections in its deck; unchanged if no deck matches."""
     if inventory is None or check_model_of_deck(run, inventory):
         return run
     return run.within(_find_surroundings(inventory))
 
 
 def _find_surroundings(inventory: Inventory) -> Surroundings:
-    """Return gravity, supports and connected parts according to the deck."""
+    """Return the gravity, the supports and the connected parts according to the deck."""
     by_part, whole = find_supports(inventory)
     supports: dict[int | None, tuple[Support, ...]] = {
         part: _make_supports(holds) for part, holds in by_part.items()
@@ -304,14 +304,14 @@ def _group_connected_parts(inventory: Inventory) -> tuple[tuple[int, ...], ...]:
 
 
 def _make_supports(holds: tuple[Hold, ...]) -> tuple[Support, ...]:
-    """Return the supports with their names and times, without duplicates."""
+    """Return the supports with their names and times, each of them once."""
     return tuple(
         dict.fromkeys(Support(hold.name, hold.start, hold.end) for hold in holds)
     )
 
 
 def _find_gravity(inventory: Inventory) -> Iterator[tuple[int, tuple[float, ...]]]:
-    """Yield each part with known gravity, and the possible accelerations of gravity on it."""
+    """Yield each part with known gravity, and the accelerations of gravity that may act on it."""
     loads = inventory.boundary.gravity
     for part, nodes in inventory.nodes_by_part.items() if loads is not None else ():
         acting = [(load, _is_gravity_on(load, part, nodes)) for load in loads or ()]
@@ -322,7 +322,7 @@ def _find_gravity(inventory: Inventory) -> Iterator[tuple[int, tuple[float, ...]
 
 
 def _is_gravity_on(load: Gravity, part: int, nodes: np.ndarray) -> bool | None:
-    """Return True if gravity acts on a part with these nodes; None if it acts on only some of the nodes."""
+    """Return True if gravity acts on a part with these nodes; None if it acts only on some of the nodes."""
     if load.nodes is None or part in load.parts:
         return True
     inside = np.isin(nodes, load.nodes)

@@ -1,4 +1,4 @@
-"""Compute the margin before the contact that ends a flight, from the rigid bodies that the parts become."""
+"""Compute the margin before the contact that ends a flight, given the rigid bodies that the parts become."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from d2rpick.flight.position_error import Bodies, RigidBody
     from d2rpick.histories.history import History
 
-# Number of times in a flight at which a body is made rigid as a trial; few suffice, because internal motion is slow.
+# Number of times in a flight at which a trial makes a body rigid; few suffice, because internal motion is slow.
 _TIMES: Final = 100
 
 
@@ -75,7 +75,7 @@ def find_margin(history: History, flight: Flight, settings: Settings) -> Margin:
 def _judge_rotation(
     history: History, flight: Flight, margin: Margin, position_error: float | None
 ) -> str | None:
-    """Return how an unknown rotation of the bodies affects a ``margin`` (see `Margin`)."""
+    """Return the effect of an unknown rotation of the bodies on a ``margin`` (see `Margin`)."""
     from d2rpick.flight.turning_bound import may_turn_back
 
     if margin.time > compute_margin(history, flight, place=position_error).time:

@@ -54,7 +54,7 @@ if TYPE_CHECKING:
     from d2rpick.deck.model import Inventory
     from d2rpick.histories.run import OpenedRun
 
-# Savings that differ by at most this are treated as equal [-], because the cost model has errors of a few percent.
+# Savings that differ by at most this are treated as equal [-], because the cost model is accurate to a few percent.
 _LIKE: Final = 0.01
 # Smallest fraction of the mass of all switchable parts that the set "heavy" contains [-].
 _HEAVY: Final = 0.5
@@ -63,7 +63,7 @@ _NO_ANGLE: Final = "the part momenta do not show how a body of these parts rotat
 
 
 class PartSet(NamedTuple):
-    """A set of parts with its saving and its errors; unknown values are None, with the cause in ``reasons``.
+    """A set of parts with its saving and errors. Unknown values are None, with the cause in ``reasons``.
 
     ``bodies`` are the rigid bodies that the parts become, ``cost_share`` is the fraction of a step that they save [-].
     `step_growth` is the factor by which the time step may grow meanwhile [-], infinite if no deformable part limits
@@ -105,7 +105,7 @@ class PartSet(NamedTuple):
 
     @property
     def is_usable(self) -> bool:
-        """True if the pair of the set is not poor."""
+        """True if the grade of the set's pair is not "poor"."""
         return self.decision is None or self.decision.grade != POOR
 
     @property
@@ -179,7 +179,7 @@ def compare_sets_of_parts(
     comparison = _SetComparison(run, settings, model, rows)
     sets: list[PartSet] = []
     for part_set in _list_sets(rows, given_ids):
-        # All sets get the same td, so that they can be compared.
+        # All sets get the same td so that they can be compared.
         td = next((earlier.window[1] for earlier in sets if earlier.window), None)
         sets.append(comparison.of(part_set, times or td))
         if part_set.name == _ALL:
@@ -224,7 +224,7 @@ def find_given_parts(run: OpenedRun, names: Sequence[str]) -> tuple[int, ...]:
 def recommend_parts(
     run: OpenedRun, settings: Settings, model: CostModel
 ) -> tuple[int, ...]:
-    """Return the part ids of the recommended set.
+    """Return the ids of the parts in the recommended set.
 
     Raises
     ------
@@ -259,7 +259,7 @@ def _drop_repeated_sets(sets: Sequence[PartSet]) -> list[PartSet]:
 
 
 def _list_sets(rows: Sequence[PartRow], given_ids: Sequence[int]) -> Iterator[PartSet]:
-    """Yield the sets that are useful to compare."""
+    """Yield the sets that are worth comparing."""
     movable = [row for row in rows if row.movable]
     stopped = [row for row in movable if row.flight and row.flight.deforms is False]
     rows_by_name = {
@@ -293,7 +293,7 @@ def _select_heavy(movable: Sequence[PartRow]) -> list[PartRow]:
 
 @dataclass(frozen=True)
 class _SetComparison:
-    """The run, settings, costs and parts that the comparison of all sets shares."""
+    """The run, settings, costs and parts on which the comparison of all sets is based."""
 
     run: OpenedRun
     settings: Settings
@@ -374,7 +374,7 @@ class _SetComparison:
         return frozenset() if inventory.ties else frozenset(parts) - {*main}
 
     def _with_window(self, part_set: PartSet, times: Times | float | None) -> PartSet:
-        """Add the window in which the parts of a set may be rigid.
+        """Add the window during which the parts of a set may be rigid.
 
         Raises
         ------
@@ -441,7 +441,7 @@ def _add_position_error(part_set: PartSet, situation: Situation, tr: float) -> P
 
 
 def _mark_recommended(sets: Sequence[PartSet]) -> Iterator[PartSet]:
-    """Mark the recommended set: the one with the largest saving or, among equal savings, with the fewest parts.
+    """Mark the recommended set: the one with the largest saving or, if savings are equal, with the fewest parts.
 
     A set with a poor pair, or with too large a position error, is considered only if all sets have one.
     """

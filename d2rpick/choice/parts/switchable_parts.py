@@ -29,20 +29,20 @@ if TYPE_CHECKING:
     from d2rpick.histories.run import OpenedRun
 
 
-# A part no longer deforms if its energy in flight has at most this standard deviation, relative to the mean [-].
+# A part no longer deforms if the standard deviation of its energy in flight is at most this fraction of the mean [-].
 STOPPED: Final = 0.1
 # Duration of the first phase of a landing, as a fraction of the preceding flight [-].
 _LANDING: Final = 0.05
 
 SWITCH, MERGE, KEEP, UNKNOWN = "switch", "merge", "keep", "unknown"
 # LANDING_ALONE: a bumper or skid absorbs at least this fraction of the energy at the start of the landing [-].
-# _CHEAP: largest fraction of the total element cost that a bumper or skid may have and still stay deformable [-].
+# _CHEAP: a bumper or skid may stay deformable if its element cost is at most this fraction of the total [-].
 LANDING_ALONE: Final = 0.9
 _CHEAP: Final = 0.1
 
 
 class InFlight(NamedTuple):
-    """Data of one part in one flight; energies are None if they are not written or if the part has none.
+    """Data of one part in one flight; energies are None if they are not written or the part has none.
 
     ``scatter`` is the standard deviation of the internal energy over its mean [-]; ``change`` is its value at the end
     minus that at the start [energy].  ``landing`` is the energy that the part takes up at the start of the landing.
@@ -143,7 +143,7 @@ def collect_facts(run: OpenedRun, settings: Settings) -> RunFacts:
 
 
 def _read_energy_of_flight(run: OpenedRun) -> tuple[History, Sequence[Part] | None]:
-    """Return the energy of the parts that fly together (all deformable parts if none fly), and the flying parts."""
+    """Return the energy of the parts that fly together (of all deformable parts if none fly), and the flying parts."""
     members = give_if_written(lambda: find_parts_flying_together(run))
     chosen = members or list_deformable_parts(run)
     return run.history(Selection(parts=tuple(str(part.id) for part in chosen))), members
@@ -162,7 +162,7 @@ def _is_flying(
 def _measure_in_flight(
     time: Samples, energy: Samples, span: tuple[float, float], flies: bool | None
 ) -> InFlight:
-    """Return mean, change and standard deviation of a part's energy in flight, and its energy in the landing."""
+    """Return the mean, change and standard deviation of a part's energy in flight, and its energy in the landing."""
     inside = energy[find_window(time, *span)]
     if not inside.size or not inside.any():
         return InFlight(flies)
@@ -267,7 +267,7 @@ def _describe_part(
     by_deck: tuple[float | None, float | None],
     printed: Mapping[int, tuple[float, str]],
 ) -> PartRow:
-    """Collect the data of a part; ``by_deck`` contains the mass and the time step that its deck defines."""
+    """Collect the data of a part; ``by_deck`` contains the mass and the time step that the deck defines."""
     fact = facts.parts.get(part)
     inventory = model.inventory if model else None
     data = inventory.parts.get(part) if inventory else None
@@ -348,7 +348,7 @@ def _judge_part(
 
 
 def _describe_joined(row: PartRow, inventory: Inventory | None) -> Iterator[str]:
-    """Yield a remark that names the parts joined to a part; the welds and ties are inactive while it is rigid."""
+    """Yield a remark that names the parts joined to a part; their welds and ties are inactive while it is rigid."""
     joined = inventory.joined.get(row.id, {}) if inventory else {}
     if joined:
         kinds = ", ".join(sorted(frozenset[str]().union(*joined.values())))
@@ -408,7 +408,7 @@ def _describe_pieces(row: PartRow, inventory: Inventory | None) -> Iterator[str]
 def _list_unknowns(
     row: PartRow, facts: RunFacts, inventory: Inventory | None, data: PartData | None
 ) -> Iterator[str]:
-    """Yield the missing data needed for a verdict on a part, if there is no reason against switching it."""
+    """Yield the missing data that a verdict on a part needs, if there is no reason against switching it."""
     if inventory is None:
         yield "without a deck it is unknown whether it is discrete, already rigid, or shares nodes"
     elif data is None:
@@ -468,7 +468,7 @@ def compute_step_growth(
 
 
 def find_landing_alone(rows: Sequence[PartRow]) -> int | None:
-    """Find the cheap part that absorbs nearly all the energy at the start of the landing after the longest flight."""
+    """Find the cheap part that absorbs nearly all energy at the start of the landing after the longest flight."""
     taken = {
         row.id: row.flight.landing
         for row in rows

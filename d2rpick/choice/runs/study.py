@@ -1,4 +1,4 @@
-"""Answer one question for many runs: the tr of each run, their agreement, one tr for all runs, and outliers."""
+"""Answer one question for many runs: the tr of each run, whether they agree, one tr for all runs, and outliers."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.question import Settings
     from d2rpick.histories.history import Samples
 
-# Status of a run; runs with one of the first two values were judged.
+# Status of a run; only runs with one of the first two values were judged.
 OK, NONE, UNREADABLE, OUT_OF_RANGE, FAILED = (
     "ok",
     "none",
@@ -55,17 +55,17 @@ OK, NONE, UNREADABLE, OUT_OF_RANGE, FAILED = (
     "out-of-range",
     "failed",
 )
-# Distance of Tukey's fences from the quartiles, in interquartile ranges [-]; values beyond the fences are outliers.
+# Distance of Tukey's fences from the quartiles, in interquartile ranges [-]; outliers lie beyond the fences.
 _FENCE: Final = 1.5
 # Largest number of runs that are named in a sentence.
 NAMED: Final = 3
-# Largest fraction of the rigid time that may be lost by rounding tr to fewer digits [-].
+# Rounding tr to fewer digits may shorten the rigid time by at most this fraction [-].
 _ROUNDED: Final = 0.001
-# Codes of the warnings about single runs that a study does not repeat, because the row of the run shows them.
+# Codes of warnings about single runs that a study does not repeat, because the row of the run shows them.
 _NOT_REPEATED = ("no-candidate",)
-# Smallest end time of a complete record, as a fraction of the median end time of all runs [-].
+# A record is complete if it ends no earlier than this fraction of the median end time of all runs [-].
 _WHOLE: Final = 0.99
-# Number of intervals of a drawn curve; only the lowest and highest energy in each interval are drawn.
+# Number of intervals of a drawn curve, of which only the lowest and highest energy are drawn.
 _STRETCHES = 200
 
 
@@ -74,7 +74,7 @@ _DEFAULT = Selection()
 
 @dataclass(frozen=True)
 class Question:
-    """The question that is answered for every run; ``td`` is a time, a time range, or None for the longest flight.
+    """The question that is asked of every run; ``td`` is a time, a time range, or None for the longest flight.
 
     With ``curve`` an outline of the energy is kept for drawing.
     """
@@ -88,7 +88,7 @@ class Question:
 
 
 class Stamp(NamedTuple):
-    """Size in bytes and modification time in nanoseconds of a file at the time of reading its run."""
+    """Size in bytes and modification time in nanoseconds of a file when its run was read."""
 
     name: str
     size: int
@@ -97,7 +97,7 @@ class Stamp(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class StudyRow:
-    """The answer for one run, with times in the unit of its history; unknown values are None.
+    """The answer for one run, with times in the unit of its history; None if a value is unknown.
 
     ``status`` is "ok"; "none": nothing can be recommended; "unreadable"; "out-of-range": the record does not reach td
     or is too short; "failed": its process died; "internal-error": the program failed.  ``message`` gives the reason for
@@ -138,7 +138,7 @@ class StudyRow:
 
 
 class Common(NamedTuple):
-    """The tr for all judged runs, with the window that all runs share [time]; None, with the reason, if none suits.
+    """The tr for all judged runs, with the window that all runs share [time]; None, with a reason, if no tr suits all.
 
     ``keeps_tolerance``: tr lies within the timing tolerance of every run, so that no error exceeds the error at the
     run's own tr by more than 0.05.  ``errors`` are the errors at this tr, one for each run: residuals, or
@@ -162,7 +162,7 @@ class Spread(NamedTuple):
 
 @dataclass(frozen=True)
 class StudyOfRuns:
-    """The answer of ``study``; ``agree`` is True if the tr intervals of the runs intersect, None if there is no tr.
+    """The answer of ``study``; ``agree`` is True if the tr intervals of all runs overlap, None if there is no tr.
 
     ``td`` is None if each run has its own, chosen in ``td_window``, or in its longest flight if that is None too.
     """
@@ -188,7 +188,7 @@ class StudyOfRuns:
 
     @property
     def grade(self) -> str | None:
-        """Grade of the common tr, the worst grade of any run's pair or of its error at this tr; None if unknown."""
+        """Grade of the common tr: the worst grade of any run's pair, or of its error at this tr; None if unknown."""
         if self.common.tr is None:
             return None
         grades = [row.quality for row in self.runs if row.quality]
@@ -209,12 +209,12 @@ class StudyOfRuns:
 
     @property
     def is_choice_refused(self) -> bool:
-        """True if td was chosen, and the common tr cannot be used; for a given td the best tr is not a problem."""
+        """True if td was chosen and the common tr cannot be used; for a given td, the best tr is always accepted."""
         return self.td is None and self.grade == POOR
 
 
 def judge_run(question: Question, source: str) -> StudyRow:
-    """Read and judge one run. An error of the run is reported in its row.
+    """Read and judge one run. Its row reports any error.
 
     Raises
     ------
@@ -247,7 +247,7 @@ def judge_run(question: Question, source: str) -> StudyRow:
 
 
 def make_row(source: str, answer: PairSuggestion) -> StudyRow:
-    """Return the row of a study for one run, made from the answer for this run."""
+    """Return the row of a study for one run from the answer for this run."""
     best = answer.chosen
     situation = answer.situation
     acceptable = cut_before_td(
@@ -288,7 +288,7 @@ def make_row(source: str, answer: PairSuggestion) -> StudyRow:
 
 
 def _decide(answer: PairSuggestion) -> Decision | None:
-    """Return the verdict on the pair of a run; for a given td it names the better pair that ``suggest`` names."""
+    """Return the verdict on the pair of a run; for a given td, it names the same better pair as ``suggest``."""
     return answer.decision if answer.td_window else decide_with_better_pair(answer)
 
 
@@ -311,7 +311,7 @@ def make_failed_row(source: str, error: BaseException) -> StudyRow:
 
 
 def stamp_files(source: str) -> tuple[Stamp, ...]:
-    """Return size and modification time of each file of a run, by absolute name; empty if there are no files."""
+    """Return the size and modification time of each file of a run, by absolute name; empty if there are no files."""
     try:
         states = [
             (os.path.realpath(name), Path(name).stat()) for name in expand([source])
@@ -344,7 +344,7 @@ def compare_rows(
 
 
 def _find_common_interval(rows: Sequence[StudyRow]) -> tuple[list[float], float, float]:
-    """Return the tr of all runs, and the interval that lies within the accuracy of every tr (empty if low > high)."""
+    """Return the tr of all runs, and the interval within the accuracy of every tr (empty if low > high)."""
     chosen = [(row.tr, row.tr_low, row.tr_high) for row in rows if row.tr is not None]
     low = max((bound for _, bound, _ in chosen if bound is not None), default=np.inf)
     high = min((bound for _, _, bound in chosen if bound is not None), default=-np.inf)
@@ -363,15 +363,15 @@ def find_cut_runs(rows: Sequence[StudyRow]) -> list[StudyRow]:
 
 
 def describe_end_of_record(row: StudyRow) -> str:
-    """Describe how the record of a cut-off run ends: within a state, or earlier than most others."""
+    """Describe how the record of a cut-off run ends: within a state, or earlier than most other records."""
     if "truncated-input" in row.warnings:
         return f"cut at {row.record_end:g}"
     return f"ends early, at {row.record_end:g}"
 
 
 def find_repeated_runs(rows: Sequence[StudyRow]) -> tuple[list[StudyRow], ...]:
-    """Return the groups of judged runs that were read from the same files, or from files with the same content."""
-    # The contents of files are compared only if the sizes of the files and the answers for the runs are equal.
+    """Return the groups of judged runs that were read from the same files or from files with equal content."""
+    # File contents are compared only if the file sizes and the answers for the runs are equal.
     alike: dict[tuple[Any, ...], list[StudyRow]] = {}
     for row in rows:
         if row.judged and row.files:
@@ -463,7 +463,7 @@ def _warn_about_runs(rows: Sequence[StudyRow], common: Common) -> Iterator[Cauti
 
 
 def choose_common_tr(rows: Sequence[StudyRow]) -> Common:
-    """Choose one tr for all judged runs: the median if their tr agree, otherwise the earliest tr that suits all runs.
+    """Choose one tr for all judged runs: the median if the tr agree, otherwise the earliest tr that suits all runs.
 
     A tr suits all runs if it keeps the timing tolerance of every run.  If no tr does, choose the earliest tr that is
     acceptable in all runs and at which the largest loss of a run is hardly larger than necessary.  Unless the runs
@@ -501,7 +501,7 @@ def _find_agreed_tr(judged: Sequence[StudyRow], keeping: Samples) -> float | Non
 def _find_least_loss(
     judged: Sequence[StudyRow], shared: Samples
 ) -> tuple[float, float]:
-    """Return the first interval of the shared windows whose largest loss is within 0.02 of the minimum."""
+    """Return the first interval of the shared windows whose largest loss exceeds the minimum by at most 0.02."""
     profiles = [row.profile for row in judged if row.profile is not None]
     times = np.unique(
         np.concatenate([shared.ravel(), *(profile[0] for profile in profiles)])
@@ -520,7 +520,7 @@ def _find_least_loss(
 
 
 def find_fewest_digits(low: float, high: float) -> float:
-    """Return the number between ``low`` and ``high`` with the fewest digits: 0, or the number nearest to the mean.
+    """Return the number with the fewest digits from ``low`` to ``high``: 0, or the number nearest to the mean.
 
     Examples
     --------
@@ -535,7 +535,7 @@ def find_fewest_digits(low: float, high: float) -> float:
 
 
 def format_number_of_runs(number: int) -> str:
-    """Return a number of runs in words, such as "1 run" or "2 runs"."""
+    """Return a number of runs in words, e.g. "1 run" or "2 runs"."""
     return "1 run" if number == 1 else f"{number} runs"
 
 
@@ -563,7 +563,7 @@ def _is_in_windows(windows: Samples, time: float) -> bool:
 
 
 def find_outliers(rows: Sequence[StudyRow]) -> tuple[StudyRow, ...]:
-    """Return the outliers: first the judged runs without any tr, then runs whose tr lies beyond Tukey's fences.
+    """Return the outliers: first the judged runs without any tr, then the runs whose tr lies beyond Tukey's fences.
 
     The farthest from the median come first.
     """

@@ -27,19 +27,19 @@ if TYPE_CHECKING:
     from d2rpick.histories.run import OpenedRun
 
 
-# Two runs are of the same model if their energies before the switch differ by at most this fraction [-].
+# Runs belong to the same model if their energies before the switch differ by at most this fraction [-].
 _OF_ANOTHER_MODEL: Final = 0.2
-# Fraction of the record in which runs are assumed to be deformable if the time of the switch is unknown [-].
+# If the switch time is unknown, runs are assumed to be deformable for this first fraction of the record [-].
 _EARLY: Final = 0.1
 # The motions of both runs are treated as equal if the momenta after td differ by at most this fraction [-].
 MOST_MOMENTUM_ERROR = 0.05
-# Smallest divisor of deviations, as a fraction of the largest momentum [-], because a body may be at rest.
+# Smallest divisor of deviations, as a fraction of the largest momentum [-]; it is needed because a body may rest.
 _AT_REST = 0.01
-# A note is issued if the energy reported while rigid differs from the energy at td by more than this fraction [-].
-# The reported energy can differ, because some solvers report a wrong energy for rigid solid elements.
+# A note is issued if the energy while rigid differs from the energy at td by more than this fraction [-].
+# The energies can differ because some solvers report a wrong energy for rigid solid elements.
 _REPORTED_OFF = 0.01
-# _STILL: largest change of an energy that is treated as constant, relative to the energy [-].
-# _STILL_OF_VIBRATION: largest change of an energy treated as constant, relative to the vibration energy [-].
+# _STILL: relative changes of an energy up to this are treated as zero [-].
+# _STILL_OF_VIBRATION: changes of an energy up to this fraction of the vibration energy are treated as zero [-].
 _STILL, _STILL_OF_VIBRATION = 1e-4, 1e-2
 # Relative tolerance for the energy near tr [-], because the solver may switch a state or two after the output.
 _ABOUT = 0.05
@@ -86,7 +86,7 @@ def compare_with_reference(
     switched: Reference,
     min_mean: float = 0.0,
 ) -> Comparison:
-    """Compare a finished switched run with its reference run, using the parts that both runs contain.
+    """Compare a finished switched run with its reference run by the parts that both runs contain.
 
     Both are read in the same way.  ``situation`` is that of td in the reference run; ``min_mean`` is described at
     ``compare_runs``.
@@ -126,7 +126,7 @@ def compare_with_reference(
 
 
 def _read_momentum(run: OpenedRun, parts: Sequence[Part] | None) -> Track | None:
-    """Return the momentum of the given parts; None if the run lacks one of these parts or its momentum."""
+    """Return the momentum of the given parts; None if the run lacks a part or its momentum."""
     missing = {part.id for part in parts or ()} - {part.id for part in run.parts}
     return None if missing else run.momentum(parts)
 
@@ -168,14 +168,11 @@ def compare_runs(
         If a run has fewer than three states from td to ``end``.
     """
     tr, td = pair
-    end = min(end, float(reference.time[-1]), float(switched.time[-1]))
-    reference_after = reference.between(td, end)[1]
-    states = min(switched.between(td, end)[1].size, reference_after.size)
-    _check_number_of_states(reference, switched, states, td, end)
-    energies_after, energy_rigid = _select_energies_after(switched, td, end)
-    frozen = float(energies_after[0])
+    after = _read_energies_after(reference, switched, td, end)
+    frozen = float(after.switched[0])
     energy_td = reference.energy_at(td)
     notes = [note for note in switched.notes if note not in reference.notes]
+    energy_rigid = after.reported_while_rigid
     if energy_rigid is not None:
         reported = f"the solver reports an energy of {energy_rigid:.6g} while the parts are rigid"
         if frozen > 0:
@@ -183,34 +180,28 @@ def compare_runs(
         notes.append(
             f"{reported}; this is a fault of some solvers for rigid solid elements, and the value is not used"
         )
-    still = _find_limit_of_change(reference, switched, tr, td)
-    error = _compute_relative_distance(*momenta, td, end)
-    rigid = _find_rigid_window(switched, tr, td, still)
-    mean = float(energies_after.mean())
-    mean_reference = float(reference_after.mean())
+    error = _compute_relative_distance(*momenta, td, after.end)
+    limit = _find_limit_of_change(reference, switched, tr, td)
+    rigid = _find_rigid_window(switched, tr, td, limit)
     objections = [
         *check_same_model(reference, switched, min(rigid[0] if rigid else tr, tr)),
-        *_check_rigid_window(reference, switched, rigid, tr, td, still),
+        *_check_rigid_window(reference, switched, rigid, tr, td, limit),
     ]
     if is_reported:
-        objections += _check_locked_in_energy(
-            reference, tr, frozen, energy_td, tolerance
-        )
-        if mean_reference > round_off(reference):
-            objections += _check_mean_energy(mean / mean_reference, min_mean)
+        objections += _check_energies_after(reference, after, pair, tolerance, min_mean)
     objections += _check_momentum(error)
     return Comparison(
         source=switched.source,
         energy_frozen=frozen,
         energy_td=energy_td,
         level_ratio=frozen / energy_td if energy_td > 0 else None,
-        end=end,
-        mean_after=mean,
-        mean_after_reference=mean_reference,
-        spread_after=float(energies_after.std()),
-        spread_after_reference=float(reference_after.std()),
+        end=after.end,
+        mean_after=float(after.switched.mean()),
+        mean_after_reference=float(after.reference.mean()),
+        spread_after=float(after.switched.std()),
+        spread_after_reference=float(after.reference.std()),
         momentum_error=error,
-        displacement=_compute_distance(*centres, td, end),
+        displacement=_compute_distance(*centres, td, after.end),
         rigid_from=rigid and rigid[0],
         rigid_to=rigid and rigid[1],
         objections=tuple(objections),
@@ -219,10 +210,34 @@ def compare_runs(
     )
 
 
+class _EnergiesAfter(NamedTuple):
+    """Energies of both runs at their states from td to ``end`` [time], each of shape (n,) [energy].
+
+    ``reported_while_rigid`` is the energy that the solver reports while the parts are rigid, None if it is right.
+    """
+
+    end: float
+    reference: Samples
+    switched: Samples
+    reported_while_rigid: float | None
+
+
+def _read_energies_after(
+    reference: History, switched: History, td: float, end: float
+) -> _EnergiesAfter:
+    """Return the energies from td to ``end``, or to the end of the shorter record; raise RangeError if too few."""
+    end = min(end, float(reference.time[-1]), float(switched.time[-1]))
+    reference_after = reference.between(td, end)[1]
+    states = min(switched.between(td, end)[1].size, reference_after.size)
+    _check_number_of_states(reference, switched, states, td, end)
+    switched_after, energy_rigid = _select_energies_after(switched, td, end)
+    return _EnergiesAfter(end, reference_after, switched_after, energy_rigid)
+
+
 def _select_energies_after(
     switched: History, td: float, end: float
 ) -> tuple[Samples, float | None]:
-    """Return the energies of the switched run from td to ``end``, and the energy reported while rigid if it is wrong.
+    """Return the energies of the switched run from td to ``end``, and the energy while rigid if it is wrong.
 
     The second value is the energy that the solver reports while the parts are rigid, None if it is right.
     """
@@ -235,7 +250,7 @@ def _select_energies_after(
     if energies_after[0] == energy_rigid and _is_reported_wrong(
         energy_rigid, energies_to_end[1:]
     ):
-        # The solver switches at the first step at or after td, so the parts were still rigid in this state.
+        # The solver switches at the first step at or after td, so the parts are still rigid in this state.
         energies_after = energies_after[1:]
         energies_to_end = energies_to_end[1:]
     is_wrong = _is_reported_wrong(energy_rigid, energies_to_end)
@@ -263,7 +278,7 @@ def _check_number_of_states(
 def _find_limit_of_change(
     reference: History, switched: History, tr: float, td: float
 ) -> float:
-    """Return the largest change of an energy that is treated as constant [energy]; it covers the rounding error."""
+    """Return the largest change of an energy that is treated as zero, at least the rounding error [energy]."""
     level = float(np.abs(switched.energies_at(np.array((tr + td) / 2))))
     digits = max(LAST_DIGIT * level, switched.energy_precision.quantum(level))
     vibrates = _compute_energy_range(reference, tr, td)
@@ -350,7 +365,7 @@ def check_same_model(
 def _check_locked_in_energy(
     reference: History, tr: float, frozen: float, energy_td: float, tolerance: float
 ) -> Iterator[str]:
-    """Yield objections if the energy at td differs from that of the reference run, either near tr or at td."""
+    """Yield objections if the energy at td differs from that of the reference run near tr or at td."""
     if max(frozen, energy_td) <= round_off(reference):
         return  # An error relative to the vibration energy has no meaning if nothing vibrates.
     about = reference.energy[np.abs(reference.time - tr) <= 2 * reference.step]
@@ -364,6 +379,25 @@ def _check_locked_in_energy(
         yield f"the frozen energy, {frozen:.6g}, differs from the energy of the reference run at td, {energy_td:.6g}"
 
 
+def _check_energies_after(
+    reference: History,
+    after: _EnergiesAfter,
+    pair: tuple[float, float],
+    tolerance: float,
+    min_mean: float,
+) -> Iterator[str]:
+    """Yield objections to the energies after td: to the locked-in energy, and to the mean energy."""
+    tr, td = pair
+    frozen = float(after.switched[0])
+    yield from _check_locked_in_energy(
+        reference, tr, frozen, reference.energy_at(td), tolerance
+    )
+    mean_reference = float(after.reference.mean())
+    if mean_reference > round_off(reference):
+        share = float(after.switched.mean()) / mean_reference
+        yield from _check_mean_energy(share, min_mean)
+
+
 def _check_mean_energy(share: float, min_mean: float) -> Iterator[str]:
     """Yield an objection if the mean energy after td differs from that of the reference run."""
     if not min_mean <= share <= 2 - min_mean:
@@ -374,14 +408,14 @@ def _check_mean_energy(share: float, min_mean: float) -> Iterator[str]:
 
 
 def _check_momentum(error: float | None) -> Iterator[str]:
-    """Yield an objection if the relative momentum error after td, ``error``, is too large."""
+    """Yield an objection if the relative momentum ``error`` after td is too large."""
     if error is not None and error > MOST_MOMENTUM_ERROR:
         moved = f"the momentum of the switched run after td differs by {error:.1%}"
         yield f"{moved} from that of the reference run, so it moves differently"
 
 
 def find_switch_times(switched: History, reference: History) -> tuple[float, float]:
-    """Find tr and td of a switched run: its energy is constant from tr to td, but that of the reference run is not.
+    """Find tr and td of a switched run: between them, its energy is constant but that of the reference run is not.
 
     Returns
     -------
@@ -445,7 +479,7 @@ def _explain_why_no_times(
 
 
 def _is_reported_wrong(rigid: float, energies_after: Samples) -> bool:
-    """Return True if the energy reported while the parts are rigid differs from the energy at td."""
+    """Return True if the energy while the parts are rigid differs from the energy at td."""
     usual = np.abs(np.diff(energies_after)).max()
     return bool(
         abs(rigid - energies_after[0])
@@ -469,7 +503,7 @@ def _compute_relative_distance(
 def _compute_distance(
     reference: Track | None, switched: Track | None, td: float, end: float
 ) -> float | None:
-    """Return the largest distance between two tracks in a time range; None if a track is missing.
+    """Return the largest distance between two tracks in a time range; None if either track is missing.
 
     The first state at or after td is left out, since the parts may still be rigid in that state.
     """

@@ -20,15 +20,15 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History, Samples
 
 Times = tuple[float, float]
-# Smallest number of consecutive states without kinetic energy, or of constant energy, that show a rigid part.
+# A part is recognised as rigid after at least this number of states without kinetic energy or of constant energy.
 FEWEST: Final = 12
-# A vibrating energy changes by at least this multiple of the limit for a constant energy [-].
+# An energy vibrates if it changes by at least this multiple of the limit for a constant energy [-].
 _MUCH: Final = 100.0
 
 
 @remember
 def find_frozen_times(history: History) -> tuple[Times, ...]:
-    """Return the windows in which a vibrating energy is constant until it falls [time]."""
+    """Return the windows in which a vibrating energy stays constant until it falls [time]."""
     energy = history.energy
     limits = np.maximum(
         LAST_DIGIT * np.abs(energy), history.energy_precision.quanta(energy)

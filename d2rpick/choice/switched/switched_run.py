@@ -39,16 +39,16 @@ if TYPE_CHECKING:
     from d2rpick.histories.run import OpenedRun
 
 Times = tuple[float, float]
-# Sources that determine the start of a flight to within a few states, unlike the energy alone.
+# Sources that, unlike the energy alone, determine the start of a flight to within a few states.
 _SHARP: Final = ("momentum", "contact-force", "contact-energy", "energy-balance")
 # Parts are treated as not moving if their momentum is at most this fraction of the model's momentum [-].
 _HARDLY: Final = 0.1
-# A flight that seems to begin at most this many output intervals after tr may have begun before tr.
+# A flight that seems to begin up to this many output intervals after tr may have begun before tr.
 _SAME_STATES: Final = 3
 
 
 class DoneWindow(NamedTuple):
-    """A window in which a run was switched, with the flight around it, and the actual and planned landing times.
+    """A window in which a run was switched, the flight around it, and the actual and planned landing times.
 
     ``landing`` and ``planned`` are None if no contact is seen, or no earlier run is given; ``step`` is the output
     interval, below which both are equal [time].
@@ -68,7 +68,7 @@ class DoneWindow(NamedTuple):
 
     @property
     def took_off(self) -> float | None:
-        """End of the contact during which the parts became rigid [time]; None if the flight began before tr."""
+        """End of the contact in which the parts became rigid [time]; None if the flight began before tr."""
         if (
             self.flight is None
             or self.flight.start is None
@@ -81,7 +81,7 @@ class DoneWindow(NamedTuple):
 
     @property
     def rigid_in_contact(self) -> bool:
-        """True if a contact began or ended while the parts were rigid, which invalidates the plan after it."""
+        """True if a contact began or ended while the parts were rigid, so that the plan after it is invalid."""
         return self.landed_rigid or self.took_off is not None
 
     @property
@@ -93,7 +93,7 @@ class DoneWindow(NamedTuple):
 
     @property
     def description(self) -> str:
-        """Description of the outcome of the window for the user, in one sentence."""
+        """Description, in one sentence, of the outcome of the window for the user."""
         if self.flight is None:
             return "no flight is found there"
         if self.took_off is not None:
@@ -119,7 +119,7 @@ class DoneWindow(NamedTuple):
 def prepare_switched_history(
     reference: Reference, done: Sequence[Times]
 ) -> tuple[History, tuple[Times, ...], tuple[Caution, ...]]:
-    """Prepare the history of a run with rigid windows, so that it can serve as a reference run.
+    """Prepare the history of a run with rigid windows for use as a reference run.
 
     Parameters
     ----------
@@ -225,7 +225,7 @@ def find_done_windows(
     windows: Sequence[Times],
     planned: Sequence[Flight] | None,
 ) -> tuple[DoneWindow, ...]:
-    """Find when the flights with completed windows landed, and when they were planned to land."""
+    """Find when the flights with completed windows landed, and when these landings were planned."""
     done = []
     for tr, td in windows:
         flight = _find_flight_around(history, flights, tr, td)
@@ -246,7 +246,7 @@ def find_done_windows(
 def _find_flight_around(
     history: History, flights: Sequence[Flight], tr: float, td: float
 ) -> Flight | None:
-    """Return the flight with the longest overlap with a window; None if no flight overlaps the window."""
+    """Return the flight that overlaps a window the longest; None if no flight overlaps it."""
 
     def shared(flight: Flight) -> float:
         start = history.start if flight.start is None else flight.start
@@ -350,7 +350,7 @@ def _find_frozen_windows(history: History) -> Iterator[_AbsentWindow]:
 def _select_deformable(
     reference: Reference, among: Sequence[Part] | None = None
 ) -> tuple[Part, ...]:
-    """Return the chosen parts (by default all) that have internal energy; ``among`` restricts the choice."""
+    """Return the chosen parts (by default all) with internal energy; ``among`` restricts the choice."""
     run, history = reference
     ids = {part.id for part in run.parts if among is None} | {
         part.id for part in among or ()
@@ -424,7 +424,7 @@ def choose_same_parts(
         return (
             _choose_compared_parts(without, switched, pair, parts) if parts else as_read
         )
-    except FormatError:  # A part quantity is missing in some states.
+    except FormatError:  # A quantity of a part is missing in some states.
         return as_read
 
 

@@ -1,1 +1,1 @@
-"""Choose td: the flights of a record, both times together, a plan of all windows, and the trade-off over td."""
+"""Choose td: find the flights of a record, both times together, a plan of all windows, or the trade-off over td."""

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History, Momenta, Samples
     from d2rpick.histories.names import Part
 
-# Times at which the search for a contact-free vibration starts, as fractions of the record [-].
+# Times at which the search for a vibration without contact starts, as fractions of the record [-].
 _WHERE_IT_VIBRATES: Final = (0.5, 0.75, 0.875)
 # Shortest useful rigid window, as a fraction of the record [-]; a shorter window saves less than a restart costs.
 MIN_RIGID: Final = 0.05
@@ -70,7 +70,7 @@ def find_longest_flight(
 
 
 def compute_last_td(end: float, margin: float) -> float:
-    """Return the last td that is at least ``margin`` before the end of a flight after rounding for print [time]."""
+    """Return the last td that, when rounded for print, is at least ``margin`` before the end of a flight [time]."""
     return round_down_as_read(sum_times_as_read(end, -margin)) if margin else end
 
 
@@ -172,7 +172,7 @@ def _find_last_before(landing: float, flights: Iterable[Flight]) -> Flight | Non
 def _find_flights_without_landing(
     history: History, settings: Settings
 ) -> tuple[Flight, ...]:
-    """Find the flights from forces, momenta and energies; failing that, from an oscillator or modes, or quiet times."""
+    """Find the flights from forces, momenta and energies or, failing that, from an oscillator, modes or quiet times."""
     witnessed = find_all_seen(history)
     if witnessed:
         return tuple(
@@ -198,7 +198,7 @@ def _find_flights_without_landing(
             flight = look(first + share * (history.end - first)).flight
             start, end = flight.within(history.time)
             if flight.described and start < end and not flight.refusal:
-                # The flight ends with its vibration, even if the user gives the start of the flight.
+                # The flight ends with the vibration of the oscillator, even if the user gives the start of the flight.
                 return (flight,)
         look = make_look(history, replace(settings, replay=False))
     flights: list[Flight] = []
@@ -219,7 +219,7 @@ def _find_flights_without_landing(
 
 
 def list_momentum_columns(history: History) -> dict[str, Samples]:
-    """Return the momentum columns that show the flight, and the mass column, keyed by name.
+    """Return the momentum columns that show the flight and the mass column, keyed by name.
 
     They belong to the parts that fly longest, or to the chosen parts.  If only the velocity of the model is known, they
     are columns of the velocity.  The result is empty if neither is written at the times of the energy.
@@ -263,7 +263,7 @@ def list_flying_parts_not_chosen(history: History) -> tuple[Part, ...]:
 
 
 def _find_momenta_of_flights(history: History) -> Momenta | None:
-    """Return the momenta that show flights, or else the first ones; None if none are at the times of the energy."""
+    """Return the momenta that show flights, or else the first momenta; None if none have the times of the energy."""
     import numpy as np
 
     # Imported here to keep start-up fast.

@@ -1,4 +1,4 @@
-"""Plan the rigid windows of a run: find the times for each flight, and which windows this reference run supports.
+"""Plan the rigid windows of a run: find times for each flight, and the windows that this reference run supports.
 
 A window in which nothing vibrates locks in no energy and does not move any landing.  A window that locks in energy
 moves the next landing by less than the margin, and later landings by more than any margin.  Therefore one reference
@@ -41,14 +41,14 @@ if TYPE_CHECKING:
     from d2rpick.flight.margin import Margin
     from d2rpick.histories.history import History
 
-# An earlier window is left out if a later window is longer than this multiple of its length [-].
-# If a window of length w and a later window of length W are used, two successive runs are rigid for w and w + W.
-# If only the later window of length W is used, both runs are rigid for W, which is more in total if W > 2 w.
+# An earlier window is left out if a later window is more than this many times as long [-].
+# If windows of lengths w and W (the later one) are both used, two successive runs are rigid for w and w + W.
+# If only the later window is used, both runs are rigid for W, which is more in total if W > 2 w.
 _LONGER: Final = 2.0
 
 
 class PlannedFlight(NamedTuple):
-    """One flight of a run and the rigid window in it, with times in the unit of the history.
+    """One flight of a run and its rigid window, with times in the unit of the history.
 
     ``status`` is "supported" by this reference run, "re-plan" from a switched run, "done", or "left-out"; ``reason``
     explains all but the first.  ``answer`` is the suggestion for this flight, None if there is none.  ``done``
@@ -84,7 +84,7 @@ class PlannedFlight(NamedTuple):
 
     @property
     def rigid_fraction(self) -> float | None:
-        """Fraction of the record for which this window makes the parts rigid [-]; None if there is no window."""
+        """Fraction of the record for which the window makes the parts rigid [-]; None if there is no window."""
         return None if self.rigid_time is None else self.rigid_time / self.record
 
     @property
@@ -94,12 +94,12 @@ class PlannedFlight(NamedTuple):
 
     @property
     def decision(self) -> Decision | None:
-        """Verdict on the pair as in ``suggest``; None if there is no pair, or if a finished run has used the window."""
+        """Verdict on the pair as in ``suggest``; None if there is no pair or a finished run has used the window."""
         return self.answer.decision if self.answer else None
 
     @property
     def quality(self) -> Quality | None:
-        """Grade of the pair as in ``suggest``; None if there is no window, or if a finished run has used the window."""
+        """Grade of the pair as in ``suggest``; None if there is no window or a finished run has used it."""
         return self.answer.quality if self.answer and self.window else None
 
     @property
@@ -143,7 +143,7 @@ class RunPlan:
 
     @property
     def all_windows(self) -> tuple[Times, ...]:
-        """Pairs (tr, td) of all windows not yet computed, including those that need a switched run first [time]."""
+        """Pairs (tr, td) of all windows not yet computed, including those that require a switched run first [time]."""
         return tuple(
             row.window
             for row in self.flights
@@ -152,7 +152,7 @@ class RunPlan:
 
     @property
     def next_run(self) -> tuple[Times, ...]:
-        """Pairs (tr, td) of all windows of the next run, both used and supported [time]; empty if no window is new.
+        """Pairs (tr, td) of all windows of the next run, used or supported [time]; empty if no window is new.
 
         The next run starts again from the beginning, so it needs both kinds.
         """
@@ -170,7 +170,7 @@ class RunPlan:
 
     @property
     def run_time_share(self) -> float | None:
-        """Expected run time with the windows relative to the reference run [-]; None without the cost fraction."""
+        """Expected run time with the windows, relative to the reference run [-]; None if no cost fraction is known."""
         return self.settings.run_time_share(self.rigid_fraction)
 
 
@@ -214,7 +214,7 @@ def plan_run(
     history, done_times, cautions = prepare_switched_history(reference, done)
     reference = reference._replace(history=history)
     flights = find_flights(history, settings)
-    # The earlier run may itself be a switched run.
+    # The earlier run may be a switched run, too.
     earlier = before and find_flights(prepare_switched_history(before, ())[0], settings)
     done_rows = find_done_windows(history, flights, done_times, earlier)
     judged: Iterable[PlannedFlight] = _list_rows(
@@ -285,7 +285,7 @@ def _suggest_window(
     shortest: float,
     landed: float | None,
 ) -> PlannedFlight:
-    """Complete a row of the plan with the window that is suggested if the flight starts after the previous landing.
+    """Complete a row of the plan with the window suggested for a flight that starts after the previous landing.
 
     The energy alone shows a different start of the flight to each td, and some td show an oscillator that others do
     not: the row has the flight as seen from the chosen td.
@@ -347,7 +347,7 @@ def _explain_short_window(rigid: float, shortest: float, margin: Margin) -> str:
 
 
 def _leave_out_short(rows: Sequence[PlannedFlight]) -> Iterator[PlannedFlight]:
-    """Leave out each window that locks in energy if a much longer window follows that would need a further run."""
+    """Leave out each window that locks in energy if a much longer window follows it that would need a further run."""
     for index, row in enumerate(rows):
         rigid = row.rigid_time or 0.0
         longest_after = max(
@@ -420,7 +420,7 @@ def _warn_about_blocked(rows: Sequence[PlannedFlight]) -> Iterator[Caution]:
 def _warn_about_windows(
     rows: Sequence[PlannedFlight], done_rows: Sequence[DoneWindow]
 ) -> Iterator[Caution]:
-    """Yield the warnings about the windows, each of them once."""
+    """Yield the warnings about the windows, each only once."""
     for done in done_rows:
         window = f"the window {done.tr:.6g} to {done.td:.6g}: {done.description}"
         if done.rigid_in_contact:

@@ -40,24 +40,24 @@ if TYPE_CHECKING:
 
     Choice = tuple[Situation, Pair]
 
-# The search for the best td tries this many of the most promising energy peaks, and as many of the last peaks.
+# The search for the best td tries this many of the most promising energy peaks and as many of the last peaks.
 _MOST_PEAKS: Final = 12
-# The windows compared for many modes have at least these lengths, relative to the longest window [-].
+# For many modes, windows of at least these lengths are compared, relative to the longest window [-].
 _LEAST_RIGID: Final = (0.5, 0.25)
 _FEWEST_TD, _MOST_TD = 3, 1000
-# Number of td values in a uniform grid; it suffices for a smooth curve on paper and on screen.
+# Number of td values in a uniform grid, which gives a smooth curve on paper and on screen.
 STEPS: Final = 200
 # Number of decimals with which errors are shown to the user.
 _READ: Final = 3
-# A pair is mentioned if it is rigid for longer than the recommended pair by this fraction of the td range [-].
+# A pair is mentioned if its rigid time exceeds that of the recommended pair by this fraction of the td range [-].
 _MUCH: Final = 0.1
 # Safety factor on the uncertainty of a contact time that is estimated from the energy [-].
-# In 20 computed falls, the uncertainty was up to 1.9 times its estimate.
+# In 20 computed falls, the true error was up to 1.9 times the estimated uncertainty.
 _HIDDEN: Final = 2.0
 
 
 def bound_rigid_times(situation: Situation, times: Samples) -> Samples:
-    """Return upper bounds on the rigid time of the recommended tr at each td of ``times``, shape (n,) [time].
+    """Return upper bounds of the rigid time of the recommended tr at each td of ``times``, shape (n,) [time].
 
     If only the level decides, that tr does not lie before the energy first comes near the level at td. "Near" is the
     tolerance, or the margin of like levels if the energy passes the level itself and turns twice before td.  If a model
@@ -88,7 +88,7 @@ def bound_rigid_times(situation: Situation, times: Samples) -> Samples:
     )
     passes = (turns >= 2) & (level > ROUNDING * np.abs(history.energy).max())
     near = np.where(passes, min(tolerance, LIKE_LEVELS), tolerance) + ROUNDING
-    # The energy reaches the level at this state, or between it and the previous state.
+    # The energy reaches the level at this state, or between the previous state and this state.
     entered = time[np.maximum(_find_first_near(*extremes, level, near) - 1, 0)]
     return np.asarray(
         np.maximum(times - np.where(level <= round_off(history), start, entered), 0.0)
@@ -98,7 +98,7 @@ def bound_rigid_times(situation: Situation, times: Samples) -> Samples:
 def _find_first_near(
     lowest: Samples, highest: Samples, level: Samples, near: Samples
 ) -> Samples:
-    """For each level, return the index of the first state whose energy reaches it; the number of states if none does.
+    """Return, for each level, the index of the first state at which the energy reaches it (n if it never does).
 
     ``lowest`` and ``highest`` are the extremes of the energy up to each state.  ``near`` is the largest level error
     that counts as near; if it is negative, the energy must have been on both sides of the level.
@@ -111,7 +111,7 @@ def _find_first_near(
 
 
 class Chosen(NamedTuple):
-    """The ``situation`` of the td chosen in a range, and the ``longest`` acceptable pair in that range.
+    """The ``situation`` of the td chosen in a range, and the ``longest`` acceptable pair of this range.
 
     ``window`` is the requested window, ``inside`` the part of it that keeps the margin [time].
     """
@@ -137,7 +137,7 @@ def choose_td(
     since: float | None = None,
     times: Sequence[float] | None = None,
 ) -> Chosen:
-    """Choose td in ``window``, or in the longest flight if it is None, with a tr no earlier than ``since``.
+    """Choose td in ``window``, or in the longest flight if ``window`` is None, with a tr no earlier than ``since``.
 
     Of the pairs at all energy peaks only those of like quality are considered, and of these only those whose tr is most
     certain; the one with the longest rigid window wins.  If deformations are known, a residual within 0.02 of the
@@ -191,7 +191,7 @@ def choose_td(
 def list_offered_times(
     situation: Situation, window: tuple[float, float], steps: int
 ) -> tuple[Samples, set[float]]:
-    """Return a grid of td that includes the energy peaks, ascending [time], and the set of the peaks."""
+    """Return an ascending grid of td that includes the energy peaks [time], and the set of these peaks."""
     # The grid omits the start of the range, because td must be later.
     grid = np.linspace(*window, steps + 1)[1:]
     peaks = np.array(situation.peaks(*window))
@@ -207,7 +207,7 @@ def list_offered_times(
 
 
 def get_error_of_pair(situation: Situation, best: Pair | None) -> float | None:
-    """Return the error by which pairs are compared across td [-]; None if there is no pair or its level is too high.
+    """Return the error by which pairs are compared across td [-]; None without a pair, or if its level is too high.
 
     A level is too high if it exceeds the largest possible vibration energy.
     """
@@ -226,7 +226,7 @@ def get_error_of_pair(situation: Situation, best: Pair | None) -> float | None:
 
 
 def round_error(error: float | None) -> float:
-    """Round an error to the digits shown to the user; infinity stands for an unknown error."""
+    """Round an error to the digits that the user sees; infinity stands for an unknown error."""
     return np.inf if error is None else round(error, _READ)
 
 
@@ -273,7 +273,7 @@ def _find_unbeaten(
 
 
 def _can_beat(situation: Situation, choice: Choice, error: float) -> bool:
-    """Return True if a pair at the td of a situation may be at least as good as ``choice``, in error and in rigid time.
+    """Return True if a pair at the td of a situation may be at least as good as ``choice`` in error and rigid time.
 
     Pairs by deformations are not compared with pairs by levels.
     """
@@ -329,7 +329,7 @@ def find_best_known(
 
 
 def _find_latest(situation: Situation, window: tuple[float, float]) -> float:
-    """Return the last td in the range that respects the margin even after rounding to printed digits.
+    """Return the last td in the range that keeps the margin even after rounding to printed digits.
 
     If no td of the window keeps it, return the last td in the flight.
     """
@@ -375,7 +375,7 @@ def _find_flying(look: Look, window: tuple[float, float]) -> Situation:
 def _rate_certainty(
     situation: Situation, window: tuple[float, float]
 ) -> tuple[bool, int, bool]:
-    """Return a sort key for the certainty that td lies in a flight; the smallest key is the most certain."""
+    """Return a sort key for the certainty that td lies in a flight; the smallest key means the greatest certainty."""
     low, high = window
     start, end = situation.flight.within(situation.history.time)
     only_ends_in_it = min(end, high) - max(start, low) < MIN_RIGID * (high - low)
@@ -387,7 +387,7 @@ def _rate_certainty(
 def _choose_by_residual(
     situation: Situation, window: tuple[float, float], look: Look
 ) -> tuple[float | None, float | None]:
-    """Return the td of the longest rigid window among the smallest residuals, and that of the longest window of all."""
+    """Return the td of the longest rigid window with a smallest residual, and the td of the longest window of all."""
     peaks = situation.peaks(*window)
     highest = sorted(peaks, key=lambda t: -situation.vibration.whole.energy(t))[
         :_MOST_PEAKS
@@ -404,7 +404,7 @@ def _choose_by_residual(
 
 
 def _select_surest(pairs: Sequence[Choice]) -> list[Choice]:
-    """Return the pairs with the most certain tr; pairs that are too short to be planned are used only if all are."""
+    """Return the pairs with the most certain tr. Pairs that are too short to be planned are used only if all are."""
     if not pairs:
         return []
     record = pairs[0][0].history.time
@@ -419,7 +419,7 @@ def _select_surest(pairs: Sequence[Choice]) -> list[Choice]:
 
 
 def _rate_tr_at(situation: Situation) -> int:
-    """Return the certainty of the tr recommended at a td, from 0 to 2; 0 if no tr is recommended."""
+    """Return the certainty of the tr that is recommended at a td, from 0 to 2; 0 if no tr is recommended."""
     best = next(rank_candidates([situation], in_flight=True)).chosen
     return 0 if best is None else rate_certainty_of_tr(best)
 
@@ -427,7 +427,7 @@ def _rate_tr_at(situation: Situation) -> int:
 def _choose_by_modes(
     situation: Situation, window: tuple[float, float], look: Look
 ) -> tuple[float | None, float | None]:
-    """Return, for many modes, the td of a long window with a small residual, and the td of the longest acceptable one.
+    """For many modes, return the td of a long window with a small residual, and that of the longest acceptable window.
 
     The energy at td does not matter.  Among good windows the longest one is used, since a longer rigid time is worth
     more than a still smaller residual.  If no long window is good, a shorter good window is used.  Without any good
@@ -465,7 +465,7 @@ def _is_good(pair: Pair) -> bool:
 
 
 def _select_within_band(pairs: Sequence[Choice]) -> list[Choice]:
-    """Return the pairs whose error is hardly larger than the smallest, or not larger within its uncertainty."""
+    """Return the pairs whose error exceeds the smallest one only slightly, or by no more than its uncertainty."""
     errors = np.array([pair.error for _, pair in pairs])
     highest = np.array([pair.residual_high for _, pair in pairs], np.float64)
     doubted = np.sqrt((errors**2 + np.fmax(highest, errors) ** 2) / 2)
@@ -476,7 +476,7 @@ def _select_within_band(pairs: Sequence[Choice]) -> list[Choice]:
 
 
 def _find_best_of_long(pairs: Sequence[Choice]) -> Choice:
-    """Return the choice with the smallest error among the choices that are hardly shorter than the longest one."""
+    """Return the choice with the smallest error among the choices that are hardly shorter than the longest choice."""
     longest = max(pair.rigid_time for _, pair in pairs)
     long = [
         choice for choice in pairs if choice[1].rigid_time >= (1 - LIKE_TIMES) * longest
@@ -487,7 +487,7 @@ def _find_best_of_long(pairs: Sequence[Choice]) -> Choice:
 def _list_times_by_modes(
     situation: Situation, bounds: tuple[float, float, float], share: float
 ) -> list[float]:
-    """Return td with the locally smallest residuals and at least ``share`` of the longest rigid time; empty for few td.
+    """Return td with locally smallest residuals and at least ``share`` of the longest rigid time; empty for few td.
 
     ``bounds`` are the first td, the first tr and the last td [time].
     """
@@ -540,7 +540,7 @@ def _choose_by_level(
     levels = situation.history.energies_at(np.array(peaks))
     falls = dict(zip(peaks, compute_shortfall(levels, mean).tolist(), strict=True))
     below = sorted((td for td in peaks if falls[td] < 1), key=falls.__getitem__)
-    # No oscillator is fitted at each td, because this would take too long.
+    # No oscillator is fitted at each td, because that would take too long.
     best = next((td for td in below if _select_acceptable([situation.at(td)])), None)
     if best is None:
         return None, None
@@ -580,7 +580,7 @@ def _select_acceptable(situations: Iterable[Situation]) -> list[Choice]:
 
 
 def _find_longest(pairs: Iterable[Choice]) -> Choice | None:
-    """Return the choice with the longest rigid time, or the last of several equal choices; None if there is none."""
+    """Return the choice with the longest rigid time, or the last of several equal ones; None if there is no choice."""
     return max(pairs, key=lambda pair: (pair[1].rigid_time, pair[0].td), default=None)
 
 

@@ -1,4 +1,4 @@
-"""Find the error and the rigid time of the best tr for each td of a grid and for each energy peak."""
+"""Find the error and the rigid time of the best tr for each td of a grid, and for each energy peak."""
 
 from __future__ import annotations
 
@@ -46,11 +46,11 @@ if TYPE_CHECKING:
     from d2rpick.choice.question import Reference, Settings
     from d2rpick.choice.td.plan import RunPlan
 
-# Another td is mentioned if its displayed error is at most this fraction of the one at the given td [-].
+# Another td is mentioned if its displayed error is at most this fraction of the error at the given td [-].
 _MUCH_LESS: Final = 0.5
-# Another pair is mentioned if its rigid time is at least this fraction of the given pair's rigid time [-].
+# Another pair is mentioned if its rigid time is at least this fraction of that of the given pair [-].
 _LEAST_KEPT: Final = 0.5
-# Number of td values in the grid on a page; at this number, its curve has a point every few pixels.
+# Number of td values in the grid on a page, which gives the curve a point every few pixels.
 _STEPS_OF_PAGE: Final = 120
 # Smallest number of td values per flight if a plan has many flights.
 _FEWEST_STEPS: Final = 40
@@ -58,7 +58,7 @@ _FEWEST_STEPS: Final = 40
 
 @dataclass(frozen=True, eq=False)
 class Offer(AnswerAtTd):
-    """The answer of ``suggest`` for one td of the trade-off. Most of its values are computed only when they are used.
+    """The answer of ``suggest`` for one td of the trade-off. Most values are computed only when they are used.
 
     ``candidates`` end with the recommended one, if any.  ``peak``: the energy peaks at td.  ``unbeaten``: no other
     offer has less error and saves as much, or saves more with no more error.  ``recommended``: it is the answer of
@@ -73,7 +73,7 @@ class Offer(AnswerAtTd):
 
     @property
     def pair(self) -> Pair | None:
-        """The recommended pair at this td, which represents the td in comparisons; None if no tr is recommended."""
+        """The recommended pair at this td, by which different td are compared; None if no tr is recommended."""
         return self.candidates.pair
 
     @cached_property
@@ -127,7 +127,7 @@ class Offer(AnswerAtTd):
 
     @cached_property
     def decision_with_cure(self) -> Decision | None:
-        """The verdict, with the better pair that ``suggest`` would name."""
+        """The verdict, including the better pair that ``suggest`` would name."""
         return decide_with_better_pair(self.answer)
 
     @property
@@ -168,7 +168,7 @@ def make_offers(
 
 @dataclass(frozen=True)
 class TradeOff:
-    """The answer of ``explore``: proposals in ascending order of td in the range ``td_window`` [time].
+    """The answer of ``explore``: proposals for the range ``td_window`` in ascending order of td [time].
 
     ``requested`` is the offer of the requested td, ``recommended`` that of the pair that ``suggest`` chooses in the
     window; ``suggestion`` is that answer in full.  ``start`` is the offer that others are compared with: that of the
@@ -188,7 +188,7 @@ class TradeOff:
 
     @property
     def more_accurate(self) -> Offer | None:
-        """The proposal with the smallest error; None if it is the recommended one, or has another kind of error."""
+        """The proposal with the smallest error; None if it is the recommended one or its error is of another kind."""
         recommended = self.recommended
         if recommended is None:
             return None
@@ -261,7 +261,7 @@ def explore_run(
     chosen = suggestion.recommended.td if suggestion.recommended else None
     fully = make_look(history, settings, since, quick=False)
     asked_at = map(look, sorted({*times, *([] if chosen is None else [chosen])}))
-    # The full search is used, because it determines why there is no oscillator.
+    # The full search is used, because only it determines why there is no oscillator.
     situations = [
         offer if offer.evidence.span else fully(offer.td) for offer in asked_at
     ]
@@ -271,7 +271,7 @@ def explore_run(
     ]
     requested = next((offer for offer in offers if offer.td == td), None)
     situation = fully(known_best.td)
-    # Before the first td of the flight, there are too few states to show a vibration.
+    # Before the first td of the flight, the states are too few to show a vibration.
     warned = suggestion.situation
     if td is not None and look(td).in_flight:
         # The energy alone shows a different flight for each td, so the flight that ``suggest`` finds is shown.
@@ -330,7 +330,7 @@ def _mark_unbeaten(offers: Sequence[Offer]) -> Iterator[Offer]:
 
 
 def _find_step(start: Offer, offers: Sequence[Offer]) -> Offer | None:
-    """Return the nearest proposal with half the error; if there is none, the recommended proposal if it is better.
+    """Return the nearest proposal with half the error or, failing that, the recommended proposal if it is better.
 
     Like ``suggest``, it tries the energy peaks first; if there is no energy peak, it takes a Pareto-optimal offer.
     """
@@ -366,7 +366,7 @@ def _warn_about_window(
     offers: Sequence[Offer],
     suggestion: PairSuggestion,
 ) -> Iterator[Caution]:
-    """Yield the warnings about the td range; warnings about a single td belong to the proposal for this td."""
+    """Yield the warnings about the td range; a warning about a single td belongs to the proposal for this td."""
     of_td = {"poor-td", "td-in-load", "td-after-contact", "no-energy", "at-rest"}
     yield from (
         caution for caution in warn_about_td(situation) if caution.code not in of_td
@@ -395,7 +395,7 @@ def _explain_by_limits(suggestion: PairSuggestion) -> str:
 
 
 def explore_flights(reference: Reference, plan: RunPlan) -> tuple[TradeOff, ...]:
-    """Explore other td for each flight of a plan. The grids are coarser if there are more flights."""
+    """Explore other td for each flight of a plan, with coarser grids if there are more flights."""
     answers = {
         row.number: row.answer for row in plan.flights if row.answer and row.window
     }

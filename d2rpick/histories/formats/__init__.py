@@ -13,7 +13,7 @@ from d2rpick.base.tuples import NamedTuple
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-# In these formats, a run is a family of files (d3plot, d3plot01, ...), and only the first file has a header.
+# In these formats, a run is a family of files (d3plot, d3plot01, ...) of which only the first has a header.
 FAMILIES: Final = ("d3thdt", "d3plot")
 
 
@@ -32,7 +32,7 @@ class Listed(NamedTuple):
     files: str = ""
 
 
-# Formats are tried in this order. A quantity is preferably read from the format that comes first.
+# Formats are tried in this order, and a quantity is read from the first format that contains it if possible.
 # Binary formats come before text formats, because their numbers have more digits.
 # csv comes after the other text formats, because it accepts any text; rare formats come last.
 READERS: Final[Mapping[str, Listed]] = {

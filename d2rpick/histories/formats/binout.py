@@ -41,7 +41,7 @@ _DISPLACEMENTS: Final = ("x_displacement", "y_displacement", "z_displacement")
 
 
 def open_legs(sources: Sequence[Source], _: Selection) -> list[Binout]:
-    """Open the files in each folder as one restart segment, because a solver writes each binout into one folder."""
+    """Open all files in a folder as one restart segment, because a solver writes each binout into one folder."""
     folders: dict[str, list[tuple[str, bytes | Content]]] = {}
     for source in sources:
         folder = os.path.dirname(os.path.normpath(source.name))  # noqa: PTH120  pathlib would slow down start-up
@@ -124,7 +124,7 @@ class Binout(Database):
         return np.stack(components, axis=2)
 
     def find_resume_points(self) -> dict[str, ResumePoint]:
-        """Return where a later read of each file can begin: before the second-to-last state of both branches."""
+        """Return where a later read of each file can begin: at the second-to-last state that both branches contain."""
         return {file.source: file.find_resume_point(_BRANCHES) for file in self._files}
 
     def branch(self, name: str) -> Branch:
@@ -140,7 +140,7 @@ class Binout(Database):
         raise FormatError(self._without(name))
 
     def _without(self, name: str) -> str:
-        """Return the message that no file of the restart segment contains a branch with this name."""
+        """Return the message that no file of the restart segment contains a branch of this name."""
         names = sorted(set().union(*(file.names for file in self._files)))
         return (
             f"{self.source}: no {name} in it, but {list_names(names) or 'nothing'}; "

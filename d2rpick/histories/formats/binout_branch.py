@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     Indices = NDArray[np.int64]
 
-# Number of values read at a time; it is small to limit the memory for the index arrays.
+# Number of values that are read at a time, which limits the memory for the index arrays.
 _CHUNK: Final = 1 << 17
 
 
@@ -41,7 +41,7 @@ class Group:
     starts: Indices
 
     def chunks(self, width: int) -> Iterator[Group]:
-        """Split the group into subgroups with so few states that ``width`` values per state fit into one read."""
+        """Split the group into subgroups that are so small that one read suffices for ``width`` values per state."""
         length = max(1, _CHUNK // max(1, width))
         for begin in range(0, self.rows.size, length):
             part = slice(begin, begin + length)
@@ -70,7 +70,7 @@ def _read_start(file: Lsda, branch: str) -> float:
 
 
 def _is_unfinished(file: Lsda, branch: str) -> bool:
-    """Return True if the layout of a branch's last state in a file differs from that of the previous state."""
+    """Return True if the layout of the last state of a branch in a file differs from that of the state before it."""
     layouts = file.visits[branch][2::3][-2:]
     return file.unfinished == branch and len({*layouts}) > 1
 
@@ -78,7 +78,7 @@ def _is_unfinished(file: Lsda, branch: str) -> bool:
 def _find_damages(
     numbers: Indices, layouts: Sequence[DirectoryLayout], where: str
 ) -> Iterator[str]:
-    """Yield descriptions of evidence that records of one file are lost or misplaced."""
+    """Yield descriptions of the evidence that records of a file are lost or misplaced."""
     steps = np.diff(numbers)
     if (steps > 1).any():
         hole = int(np.argmax(steps > 1))
@@ -102,7 +102,7 @@ def _group_states(
 
 
 class Branch(Database):
-    """The states of one branch in all files of a family; the object is false if no file contains the branch.
+    """The states of one branch in all files of a family; the object is falsy if no file contains the branch.
 
     A solver numbers its states consecutively. If a file begins with a higher number than the one after the last
     state, a file of the family is missing. A repeated number begins a newer leg, which writes the same variables:
@@ -334,7 +334,7 @@ class Branch(Database):
             yield group, variables[name]
 
     def _fitting(self, group: Group, name: str) -> set[int]:
-        """Return the plausible lengths of a variable: one, one per part, or the length in the first state."""
+        """Return the plausible lengths of a variable: one, one per part, or that of the first state."""
         if self._by_part:
             return {1, *self._list_lengths(group)}
         return {self._variables[0].get(name, group.layout.variables[name]).count}
@@ -347,7 +347,7 @@ class Branch(Database):
         return {ids.size for _, _, ids in self._id_lists}
 
     def refused(self, group: Group, why: str, row: int = 0) -> FormatError:
-        """Return the error that is raised for a value from an unreliable state."""
+        """Return the error for a value from an unreliable state."""
         return FormatError(
             f"{self.source} state {self._numbers[group.rows[row]]}: {why}"
         )
@@ -388,7 +388,7 @@ class Branch(Database):
             [start for file, start, _ in self._id_lists if file == index],
             dtype=np.int64,
         )
-        # A state uses the last list before it. A file from an MPI rank may have its list after its first states.
+        # A state uses the last list before it. In a file of one MPI rank, the list may follow the first states.
         before_state = np.searchsorted(list_starts, group.starts)
         in_force = np.maximum(lists_in_earlier_files + before_state - 1, 0)
         lists = {

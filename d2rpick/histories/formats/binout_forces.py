@@ -44,7 +44,7 @@ class ForceBranch(Branch):
 
     @property
     def writes_forces(self) -> bool:
-        """True if the states contain forces. In a run without contacts, the states contain only a time."""
+        """True if the states contain forces; in a run without contacts, they contain only a time."""
         return bool(self._variables) and all(
             "x_force" in variables for variables in self._variables
         )
@@ -77,7 +77,7 @@ class ForceBranch(Branch):
 
 
 def _join_sides(branch: ForceBranch) -> Iterator[ContactForce]:
-    """Yield one force per contact. The forces on the two sides are opposite, or only one side has a force."""
+    """Yield one force per contact. The forces on its two sides are opposite, or only one side has a force."""
     ids, first = branch.of_each("x_force")
     forces = np.stack(
         [first, *(branch.of_each(f"{axis}_force")[1] for axis in "yz")], axis=2

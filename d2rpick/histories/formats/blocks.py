@@ -23,10 +23,10 @@ if TYPE_CHECKING:
 # Placeholder for the offset of a field that is truncated or occurs twice in the block.
 UNSURE: Final = -1
 
-# Lines of at least this length are treated as damaged [bytes]; solvers never write lines this long.
+# Lines of at least this length are treated as damaged [bytes], because solvers never write such long lines.
 _OVERLONG: Final = 512
 
-# Number of bytes that are compared at a time; these bytes fit into the processor cache.
+# Number of bytes that are compared at a time, so that these bytes fit into the processor cache.
 CHUNK: Final = 1 << 20
 # Number of adjacent blocks that are compared as one row, which halves the computing time.
 _FOLD: Final = 16
@@ -36,7 +36,7 @@ _NUMBER: Final = re.compile(
     rb" *([+-]?(?:\d+\.?\d*|\.\d+))(?:[EeDd]?([+-]\d+)|[EeDd](\d+))?"
 )
 _EXACT: Final = 22  # Largest exponent at which a double holds a power of ten exactly.
-# Bit flags of a negative exponent and of a negative number; the lower bits contain the two exponent digits.
+# Bit flags of a negative exponent and of a negative number. The lower bits contain the two exponent digits.
 _SHRINKS, _NEGATIVE = 1 << 8, 1 << 9
 
 
@@ -56,7 +56,7 @@ class BlockLayout(NamedTuple):
 
 
 class Grammar(NamedTuple):
-    """Description of the blocks of a file format; it contains all that is needed to read a file.
+    """Description of the blocks of a file format, with everything that is needed to read a file.
 
     ``start`` is the text at the start of a block; ``lines`` matches the known lines. ``describe`` takes a block and
     these lines, returns the offsets of its numbers and the name of the last one, and sets the columns of the numbers
@@ -115,12 +115,12 @@ def read_head_of_listing(data: bytes | Content) -> tuple[str, str, int]:
 
 
 def make_head(title: str, database: str) -> str:
-    """Return the two header lines of a generated file. They name no release, because no solver wrote this file."""
+    """Return the two header lines of a generated file, which name no release because no solver wrote the file."""
     return f" {title}\n{' ' * 25}d2rpick {__version__}, layout of ls-dyna {database}\n"
 
 
 class Stretch(NamedTuple):
-    """A sequence of ``repeats`` blocks of ``stride`` bytes from ``start``, laid out like the one at ``example``."""
+    """A sequence of ``repeats`` blocks of ``stride`` bytes from ``start`` with the layout of the one at ``example``."""
 
     start: int
     stride: int
@@ -132,7 +132,7 @@ def count_like_example(
     data: Content, run: Stretch, offset: int, literal: Bytes, varied: Bytes | None = None,
     take: Callable[[Bytes], object] | None = None,
 ) -> int:  # fmt: skip
-    """Count the blocks of ``run`` whose fixed bytes, starting at ``offset``, equal those of the example block.
+    """Count the blocks of ``run`` whose fixed bytes from ``offset`` on equal those of the example block.
 
     Parameters
     ----------
@@ -199,14 +199,14 @@ def _find_differing_bits(rows: Bytes, example: Bytes) -> Bytes:
     count, size = rows.shape
     if count % _FOLD == 0 and rows.flags.c_contiguous:
         rows = rows.reshape(count // _FOLD, _FOLD * size)
-    # A bit equals that of the example in all rows if the AND and the OR of the rows both equal the example.
+    # A bit is the same in all rows and the example if both the AND and the OR of the rows equal the example.
     bits_of_all = _reduce_rows(np.bitwise_and, rows, size)
     bits_of_any = _reduce_rows(np.bitwise_or, rows, size)
     return np.asarray((bits_of_all ^ example) | (bits_of_any ^ example))
 
 
 def _reduce_rows(operation: np.ufunc, rows: Bytes, size: int) -> Bytes:
-    """Combine rows, each of which holds one or more blocks of ``size`` bytes, into one block by a bitwise operation."""
+    """Combine rows, which hold one or more blocks of ``size`` bytes each, into one block by a bitwise operation."""
     folded = operation.reduce(rows, axis=0).reshape(-1, size)
     return np.asarray(operation.reduce(folded))
 
@@ -279,7 +279,7 @@ def _decode_state_numbers(
 
 @cache
 def _make_scales(decimals: int) -> tuple[Samples, Samples]:
-    """Return the factor and the divisor of an integer mantissa for each exponent and sign; one of the two is always 1.
+    """Return the factor and the divisor of an integer mantissa for each exponent and sign; one of them is always 1.
 
     Factor and divisor are NaN if the conversion would be inexact.
     """

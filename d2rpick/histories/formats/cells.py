@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import re
+from functools import lru_cache
 from typing import TYPE_CHECKING, Final
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
 _COMMENTS: Final = ("#", "$", "%", "//")
-# Values that spreadsheets write, in English and German, when a computation fails.
-# A line that begins with one of these error values is a row, although "#" is the comment character.
+# Values that spreadsheets write, in English or German, if a computation fails.
+# A line that begins with such an error value is a row, although "#" is also the comment character.
 _SPREADSHEET_ERRORS: Final = frozenset(
     {
         "#div/0!",
@@ -34,7 +35,7 @@ _MISSING: Final = _SPREADSHEET_ERRORS | frozenset(
 _OVERFLOW: Final = re.compile(r"\*+|#{2,}")
 
 # Pattern of a number, keyed by decimal sign.
-# The possessive quantifiers prevent backtracking, so that matching takes time proportional to the length of a cell.
+# The possessive quantifiers prevent backtracking, so that the matching time is proportional to the cell length.
 _NUMBER: Final = {
     "." : re.compile(r"[+-]?(?:\d++\.?+\d*+|\.\d++)(?:[eEdD][+-]?\d++)?", re.ASCII),
     ",": re.compile(r"[+-]?(?:\d++,?+\d*+|,\d++)(?:[eEdD][+-]?\d++)?", re.ASCII),
@@ -43,27 +44,27 @@ _NUMBER: Final = {
 _GROUPED: Final = r"[+-]?[1-9]\d{0,2}(?:%s\d{3})+(?:%s\d*)?"
 # Thousands separators that are tried in addition to "." and ",".
 _THOUSANDS: Final = ("'", "’", "\N{NO-BREAK SPACE}", "\N{NARROW NO-BREAK SPACE}", " ")
-# Pattern of a date, clock time or percentage. It is not a number, but does not show that the separator is wrong.
+# Pattern of a date, clock time or percentage, which is not a number but does not make the separator implausible.
 _DATE_OR_SHARE: Final = re.compile(
     r"\d{1,4}[-/.:]\d{1,2}[-/.:]\d.*|[-+]?[\d.,]+\s*%", re.ASCII
 )
-# Characters that rules between rows or around a table consist of.
+# Characters of the lines that separate rows or surround a table.
 _RULE: Final = "-=+|:_ \t"
 _RULE_STARTS: Final = ("-", "=", "+", "|", ":")
 
 
 def split_cells(line: str, separator: str | None) -> list[str]:
-    """Split a line into its cells, without outer spaces and quotes; a separator inside quotes belongs to its cell.
+    """Split a line into its cells, without outer spaces and quotes. A separator inside quotes belongs to its cell.
 
     Examples
     --------
     >>> split_cells('"part 3, left", 1.5 ,', ",")
     ['part 3, left', '1.5', '']
     """
-    if '"' not in line and separator is None:
-        return line.split()
     if '"' not in line:
-        return [cell.strip() for cell in line.split(separator)]
+        if separator is None:
+            return line.split()
+        return [*map(str.strip, line.split(separator))]
     sign = separator or " "
     if separator is None:
         line = " ".join(line.split())
@@ -87,6 +88,8 @@ def is_skipped(line: str) -> bool:
     >>> [line for line in ("", "# 1,2", "#DIV/0!,1", "|---|---|", "-1.5,2") if not is_skipped(line)]
     ['#DIV/0!,1', '-1.5,2']
     """
+    if line[:1].isdigit():
+        return False  # Most lines of a table, whose number decides how long this takes.
     line = line.lstrip()
     if not line:
         return True
@@ -96,7 +99,7 @@ def is_skipped(line: str) -> bool:
 
 
 def parse_cell(cell: str, decimal: str, thousands: str = "") -> float | None:
-    """Return the number in a cell, None if it has none; unlike Python's float, reject words (``nan``) and underscores.
+    """Return the number in a cell, otherwise None. Unlike Python's float, reject words (``nan``) and underscores.
 
     Examples
     --------
@@ -114,6 +117,34 @@ def has_number(cell: str, decimal: str, thousands: str = "") -> bool:
     return _written_number(cell, decimal, thousands) is not None
 
 
+def split_columns_of_numbers(
+    lines: Sequence[str], separator: str | None, decimal: str, columns: int
+) -> list[list[str]] | None:
+    """Return the cells of each column if all lines have ``columns`` plain numbers, otherwise None; for many lines.
+
+    Examples
+    --------
+    >>> split_columns_of_numbers(["0,1.5", "1,-2e3"], ",", ".", 2)
+    [['0', '1'], ['1.5', '-2e3']]
+    >>> split_columns_of_numbers(["0,1.5", "1,n/a"], ",", ".", 2)
+    """
+    if separator is None or separator == decimal:
+        return None
+    rows = "\n".join([*lines, ""])
+    if not _compile_rows(separator, decimal, columns).fullmatch(rows):
+        return None
+    cells = rows.replace("\n", separator).split(separator)[:-1]
+    return [cells[column::columns] for column in range(columns)]
+
+
+@lru_cache
+def _compile_rows(separator: str, decimal: str, columns: int) -> re.Pattern[str]:
+    """Return the pattern of any number of rows, each ending with a line feed, of ``columns`` plain numbers."""
+    number = _NUMBER[decimal].pattern
+    further = f"(?:{re.escape(separator)}{number}){{{columns - 1}}}"
+    return re.compile(rf"(?:{number}{further}\n)*+", re.ASCII)
+
+
 def _written_number(cell: str, decimal: str, thousands: str) -> str | None:
     """Return the text of a number without thousands separators and with an ASCII minus sign; None if it is invalid."""
     if not cell.isascii():
@@ -128,7 +159,7 @@ def _written_number(cell: str, decimal: str, thousands: str) -> str | None:
 
 
 def is_missing(cell: str) -> bool:
-    """Return True if a cell is empty, or marks a missing number (``NaN``, ``n/a``, ``#DIV/0!``, ``****``)."""
+    """Return True if a cell is empty or marks a missing number (``NaN``, ``n/a``, ``#DIV/0!``, ``****``)."""
     return cell.casefold() in _MISSING or _OVERFLOW.fullmatch(cell) is not None
 
 
@@ -141,7 +172,7 @@ def is_word(cell: str) -> bool:
 
 
 def find_thousands(cells: Sequence[str], decimal: str) -> str:
-    """Return the thousands separator in the cells; empty if no cell proves that there is one.
+    """Return the thousands separator that the cells prove; empty if no cell proves one.
 
     A cell proves it with a decimal sign too, or with two such separators: "1.234" alone may be either.
 

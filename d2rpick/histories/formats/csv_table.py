@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
+from itertools import compress
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -10,7 +11,12 @@ import numpy as np
 from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import FormatError, give_if_written, list_names
 from d2rpick.histories.database import Database
-from d2rpick.histories.formats.cells import has_number, is_skipped, split_cells
+from d2rpick.histories.formats.cells import (
+    has_number,
+    is_skipped,
+    split_cells,
+    split_columns_of_numbers,
+)
 from d2rpick.histories.formats.curves import Curves, find_curves
 from d2rpick.histories.formats.layout import (
     Layout,
@@ -78,25 +84,22 @@ def find_own_times(layout: Layout) -> tuple[int, ...]:
     return times
 
 
-def find_numeric_columns(
-    layout: Layout, sample: Sequence[Sequence[str]]
-) -> frozenset[int]:
-    """Return the columns with a number in at least one sampled row; all columns if no row was sampled."""
-    columns = range(layout.columns)
-    if not sample:
-        return frozenset(columns)
+def find_numeric_columns(sample: Sequence[Sequence[str]]) -> frozenset[int]:
+    """Return the columns with a number in at least one sampled cell; all columns if no row was sampled."""
     return frozenset(
         column
-        for column in columns
-        if any(has_number(row[column], ".") for row in sample)
+        for column, cells in enumerate(sample)
+        if not cells or any(has_number(cell, ".") for cell in cells)
     )
 
 
-def _sample_rows(text: Text, begin: int, layout: Layout) -> list[list[str]]:
-    """Return the cells of sampled rows: the first rows, the last rows, and evenly spaced rows in between."""
-    lines = [line for line in text.sample(begin) if not is_skipped(line)]
-    rows = [split_cells(line, layout.separator) for line in lines]
-    return [row for row in rows if len(row) >= layout.columns]
+def _split_columns(lines: Sequence[str], layout: Layout) -> list[list[str]]:
+    """Return the cells of each column, from the lines that are rows of the table."""
+    rows = [
+        split_cells(line, layout.separator) for line in lines if not is_skipped(line)
+    ]
+    rows = [row for row in rows if len(row) >= layout.columns]
+    return [[row[column] for row in rows] for column in range(layout.columns)]
 
 
 def find_time_column(
@@ -106,7 +109,7 @@ def find_time_column(
     energies: Sequence[str],
     numeric: frozenset[int],
 ) -> tuple[int, list[str]]:
-    """Return the time column and notes on assumptions; for curves side by side, the time of the first energy is used.
+    """Return the time column and notes on assumptions. If curves stand side by side, the first energy's time is used.
 
     If no column has the name of a time, return the first ``numeric`` column that is neither a known quantity nor
     named like row numbers.
@@ -172,7 +175,7 @@ def find_internal_energy(
 
 
 def find_column(source: str, layout: Layout, wanted: str) -> int:
-    """Return the column with this name or 1-based number; raise FormatError if there is none, or several."""
+    """Return the column with this name or 1-based number; raise FormatError if there is none or more than one."""
     columns = match_names(wanted, layout.names)
     if wanted.isdecimal() and 0 < int(wanted) <= layout.columns:
         columns = [*({*columns} | {int(wanted) - 1})]
@@ -204,12 +207,12 @@ def _list_columns(layout: Layout, columns: Sequence[int]) -> str:
 
 
 def recognises(head: bytes) -> bool:
-    """Return True if the first bytes of a file are text; only a full read shows whether the text is a table."""
+    """Return True if the first bytes of a file are text; whether the text is a table appears only when it is read."""
     return head.startswith(UTF16) or b"\0" not in head
 
 
 def open_legs(sources: Sequence[Source], selection: Selection) -> list[Table | Curves]:
-    """Open text files as tables or curves. An unterminated last line is used only if it has the selected columns."""
+    """Open text files as tables or curves. An unterminated last line is used only if it has all selected columns."""
     return [
         find_curves(text, selection) or Table(text, selection)
         for text in map(Text, sources)
@@ -226,13 +229,20 @@ class Table(Database):
         self.source, self._text = text.name, text
         layout = find_layout(text)
         self._begin = text.place(layout.start)
-        sample = _sample_rows(text, self._begin, layout)
-        self._layout = layout = add_thousands(layout, sample)
-        # Cells of the sampled rows, with "." as the decimal sign.
+        lines = text.sample(self._begin)
+        sample = split_columns_of_numbers(
+            lines, layout.separator, layout.decimal, layout.columns
+        )
+        self._are_numbers = sample is not None
+        if sample is None:
+            sample = _split_columns(lines, layout)
+            layout = add_thousands(layout, sample)
+        self._layout = layout
+        # Cells of each column in the sampled rows, with "." as the decimal sign.
         self._sample = sample
         if layout.decimal != "." or layout.thousands:
-            self._sample = [[layout.plain(cell) for cell in row] for row in sample]
-        self._numeric = find_numeric_columns(layout, self._sample)
+            self._sample = [[*map(layout.plain, cells)] for cells in sample]
+        self._numeric = find_numeric_columns(self._sample)
         self._own_times = find_own_times(layout)
         self._time, notes = find_time_column(
             text.name, layout, selection.time, selection.energy, self._numeric
@@ -266,19 +276,19 @@ class Table(Database):
 
     @property
     def notes(self) -> tuple[str, ...]:  # type: ignore[override]  # a property overrides a field
-        """Notes on assumptions and omissions; the list is complete only after the required columns have been read."""
+        """Notes on assumptions and omissions, which are complete only after the required columns have been read."""
         give_if_written(lambda: self.time)
         return tuple(self._notes)
 
     def _split_channels(self) -> tuple[tuple[str, ...], list[str]]:
-        """Return the columns that contain numbers, and a note on each named column without numbers."""
+        """Return the columns that contain numbers, and a note on each named column that contains none."""
         channels = list[str]()
         notes = list[str]()
         for name, column in self._columns.items():
             if column in self._numeric:
                 channels.append(name)
                 continue
-            words = [row[column] for row in self._sample if row[column]]
+            words = [cell for cell in self._sample[column] if cell]
             if words:
                 notes.append(
                     f"column {column + 1} {name!r} holds no numbers ({words[0]!r}) and was left out"
@@ -287,7 +297,7 @@ class Table(Database):
 
     @property
     def energy_channel(self) -> str:
-        """The column whose name denotes internal energy, otherwise the only column besides the time."""
+        """The column whose name denotes internal energy or, failing that, the only column besides the time."""
         column = find_internal_energy(
             self.source, self._layout, [self._time, *self._own_times], self._numeric
         )
@@ -322,16 +332,15 @@ class Table(Database):
         return times
 
     def _refuse_rows_of_parts(self, times: Samples) -> None:
-        """Raise FormatError if the table has one row for each part at each time."""
+        """Raise FormatError if the table has a row for each part at each time."""
         # Imported here to keep start-up fast.
         from d2rpick.histories.interleaved import refuse_rows_of_parts
 
         for column in self._needed[1:]:
             energy = give_if_written(partial(self._values, column))
             if energy is not None and energy.size == times.size:
-                rows = self._sample[: self._text.some]
                 printed = {
-                    name: [row[position] for row in rows]
+                    name: self._sample[position][: self._text.some]
                     for name, position in self._columns.items()
                 }
                 refuse_rows_of_parts(self.source, times, energy, printed)
@@ -357,14 +366,17 @@ class Table(Database):
 
     def precisions(self, names: Sequence[str]) -> tuple[Precision, Precision]:
         """Return the precision with which the times and these columns were printed."""
-        times = [row[self._time] for row in self._printed]
-        energies = [row[self._columns[name]] for row in self._printed for name in names]
-        return find_precisions(times, energies, self.time)
+        printed = self._printed
+        energies = [cell for name in names for cell in printed[self._columns[name]]]
+        return find_precisions(printed[self._time], energies, self.time)
 
     @cached_property
-    def _printed(self) -> list[list[str]]:
-        """The sampled rows of the table itself, without rows after the end of a curve and lines below the table."""
-        return [row for row in self._sample if has_number(row[self._time], ".")]
+    def _printed(self) -> Sequence[Sequence[str]]:
+        """The sampled cells of each column, without rows after the end of a curve or lines below the table."""
+        if self._are_numbers:
+            return self._sample
+        is_row = [has_number(cell, ".") for cell in self._sample[self._time]]
+        return [[*compress(cells, is_row)] for cells in self._sample]
 
     def _asked(self, selection: Selection) -> list[int]:
         """Return the requested or default columns. An unterminated last line is used only if it has all of them."""
@@ -433,16 +445,16 @@ class Table(Database):
 def _is_whole_row(
     line: str, sample: Sequence[Sequence[str]], layout: Layout, used: Sequence[int]
 ) -> bool:
-    """Return True if an unterminated line has all values and its last value is either unused or certainly complete."""
+    """Return True if an unterminated line has all values, the last of which is either unused or certainly complete."""
     cells = split_cells(line, layout.separator)
     last = len(cells) - 1
     if len(cells) < layout.columns or last not in used:
         return len(cells) >= layout.columns
-    return is_whole_field(layout.plain(cells[last]), [row[last] for row in sample])
+    return is_whole_field(layout.plain(cells[last]), sample[last])
 
 
 def write(columns: Mapping[str, Samples]) -> bytes:
-    r"""Write columns (n,) under their names, each number with the fewest digits that preserve it exactly.
+    r"""Write columns (n,) under their names, with the fewest digits per number that preserve it exactly.
 
     Examples
     --------

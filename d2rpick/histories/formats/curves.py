@@ -41,7 +41,7 @@ _LONGEST_LABEL: Final = 1000
 # Pattern of the type and factor that Oasys programs write after a label: "Time <TIME/0.001>;".
 _TYPE: Final = r"\s*<([^<>/]*)(?:/([^<>]*))?>\s*;?\s*$"
 _UNITS_OF_TIME: Final = {1.0: "s", 1e-3: "ms", 1e-6: "us"}
-# Smallest number of labels above a curve: x label, y label and curve name; the title may be blank.
+# Smallest number of labels above a curve: x label, y label and curve name. The title may be blank.
 _FEWEST_LABELS: Final = 3
 # Largest number of digits in a pair count; a longer number is a sign of damage.
 _MOST_DIGITS: Final = 12
@@ -69,7 +69,7 @@ def find_curves(text: Text, selection: Selection) -> Curves | None:
 
 
 class _CurveText:
-    """State of the reader: the curves read so far, and the label of their x axis."""
+    """State of the reader: the curves that have been read, and the label of their x axis."""
 
     def __init__(self, text: Text) -> None:
         self.source, self._text = text.name, text
@@ -166,7 +166,7 @@ class Curves(Database):
 
     @property
     def energy_channel(self) -> str:
-        """The only curve, or the only curve whose name denotes an internal energy; otherwise raise FormatError.
+        """The only curve, or the only curve whose name denotes an internal energy; otherwise a FormatError is raised.
 
         The error lists all curves.
         """
@@ -312,7 +312,7 @@ def _remove_type(line: str) -> str:
 
 
 def _find_unit_of_type(line: str) -> str:
-    """Return the time unit that corresponds to the factor in a label; empty if the label has no factor."""
+    """Return the time unit that corresponds to the factor in a label; empty if the label contains no factor."""
     match = re.search(_TYPE, line.strip()[:_LONGEST_LABEL])
     factor = parse_cell(match[2].strip(), ".") if match and match[2] else None
     return "" if factor is None else _UNITS_OF_TIME.get(factor, "")
@@ -342,7 +342,7 @@ def _read_dynaform(text: _CurveText) -> bool:
 
 
 def _read_xy_pairs(text: _CurveText) -> bool:
-    """Read the XY pairs of LS-PrePost; return False for any other text."""
+    """Read a file of XY pairs written by LS-PrePost; return False for any other text."""
     top = text.top(2)
     if len(top) < 2 or not top[0].strip().isdecimal() or not _is_pair(top[1]):
         return False

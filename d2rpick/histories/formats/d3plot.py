@@ -1,4 +1,4 @@
-"""Read LS-DYNA's d3plot and d3thdt: energies, velocities and masses of the model and its parts in each state.
+"""Read d3plot and d3thdt of LS-DYNA: energies, velocities and masses of the model and its parts in each state.
 
 A run writes a family of files. The first file, d3plot, contains the head, the geometry and perhaps states; d3plot01,
 d3plot02 and so on contain whole states only. A state is its time, the values of the model and of the parts, and then
@@ -67,7 +67,7 @@ def recognises(head: bytes) -> bool:
 
 
 def open_legs(sources: Sequence[Source], _: Selection) -> list[D3plot]:
-    """Open each file family as a restart segment of the run; only the first file of a family has a header."""
+    """Open each file family as a restart segment of the run. Only the first file of a family has a header."""
     families: dict[str, dict[int, Source]] = {source.name: {} for source in sources}
     for source in sources:
         first = source.name.rstrip("0123456789")
@@ -188,7 +188,7 @@ class D3plot(Database):
 
 
 def _read_states(files: Sequence[Source], head: Head) -> _States:
-    """Read the first words of all states of a family; in the first file, the states come after the header."""
+    """Read the first words of all states of a family. In the first file, the states follow the header."""
     real = head.form.real
     values = 1 + head.globals
     contents = [make_content(file.data) for file in files]
@@ -218,7 +218,7 @@ def _read_states(files: Sequence[Source], head: Head) -> _States:
         and set(first_words_after[1:]) == {end_mark}
         and _is_ascending(rows[:, 0], ends)
     ):
-        # If each file is complete, as is usual, no file needs a separate check.
+        # If every file is complete, as is usual, the files are not checked one by one.
         return _States(rows)
     states_of_files = []
     for file, begin, piece, word in zip(
@@ -237,7 +237,7 @@ def _is_ascending(time: NDArray[np.floating[Any]], ends: Sequence[int]) -> bool:
     """Return True if times are finite and ascend in each file; ``ends`` (files,) are cumulative state counts."""
     with np.errstate(invalid="ignore"):
         ascends = np.diff(time) > 0
-    # After a restart, a file may begin with a state that an earlier file contains, too.
+    # After a restart, a file may begin with a state that is also in an earlier file.
     ascends[[end - 1 for end in ends if 0 < end < time.size]] = True
     return bool(ascends.all() and np.isfinite(time).all() and (time != END).all())
 
@@ -276,7 +276,7 @@ def _check_states(
 
 
 def _note_cut_file(content: Content, name: str, end: int, rows: Rows) -> str:
-    """Return the note on a file that does not end with an end mark."""
+    """Return the note on a file without an end mark at its end."""
     if end < len(content):
         return f"{name}: the file ends within state {len(rows) + 1}, which was left out; is the run still writing?"
     return (

@@ -1,4 +1,4 @@
-"""Skip the sections between the control words and the states of a d3plot: nodes, elements, part ids, titles.
+"""Skip the sections between the control words and the states of a d3plot: nodes, elements, part ids and titles.
 
 Only sections that describe the states are read; the others are skipped by the lengths that the control words give.
 """
@@ -25,8 +25,8 @@ _EXTRA_NODES: Final = {"nel48": 5, "nel20": 13}
 _FULL_QUADRATIC: Final = {"nel27": 28, "nel21p": 22, "nel15t": 8}
 _CUBIC: Final = {"nel20t": 21, "nel40p": 41, "nel64": 65}
 
-_NUMBERING: Final = 10  # Length of the numbering section up to its ids [words].
-# Length of the head of a numbering section that also lists part ids [words].
+_NUMBERING: Final = 10  # Length of the numbering section without its ids [words].
+# Length of the head of a numbering section that contains part ids [words].
 _PART_NUMBERING: Final = 16
 # Length of a title [bytes], which does not depend on the word size.
 _TITLE: Final = 72
@@ -39,7 +39,7 @@ _MOST_TITLES: Final = 1_000_000
 
 
 class Geometry:
-    """The sections between the control words and the titles, which are skipped one after another.
+    """The sections between the control words and the titles, skipped one after another.
 
     ``at`` is the word at which the next section begins. ``part_ids`` are the ids of the parts, first sorted, then in
     the order of their definition; empty if the file has none. The other attributes count the values in a state.
@@ -79,7 +79,7 @@ class Geometry:
         return counts
 
     def _material_types(self) -> None:
-        """Skip the material types; count the shells of rigid parts, for which a state contains no values."""
+        """Skip the material types, and count the shells of rigid parts, which have no values in a state."""
         if self._control["ndim"] in _WITH_MATERIAL_TYPES:
             self.rigid_shells, materials = self._next(2)
             self.at += materials

@@ -30,7 +30,7 @@ GLOBALS: Final = 6
 
 # Value that femzip writes in place of the number of parts.
 _FEMZIP: Final = 76_893_465
-# If the control word ``maxint`` is at most this value, a state lists deleted elements instead of deleted nodes.
+# If the control word ``maxint`` is at most this value, a state lists deleted elements rather than deleted nodes.
 _BY_ELEMENT: Final = -10_000
 # First release whose states contain the position of each rigid wall next to its force.
 _WITH_WALL_PLACES: Final = 971.0
@@ -40,7 +40,7 @@ _THERMAL: Final = {0: 0, 1: 1, 2: 4, 3: 6}
 
 
 class Head(NamedTuple):
-    """The layout of the states of a family, as described in the header of its first file.
+    """The layout of the states of a family, as given in the header of the family's first file.
 
     States begin at byte ``begin`` of it; each has ``state`` bytes. In a state, ``globals`` words follow the time: the
     values of the model, ``part_values`` quantities of each part, and the forces of ``walls`` rigid walls.
@@ -111,7 +111,7 @@ def read_d3plot_head(content: Content, source: str) -> Head:
 
 
 def _count_parts(control: Mapping[str, int]) -> int:
-    """Return the number of parts. Older files give a separate number for each element type."""
+    """Return the number of parts. Older files contain a separate number for each element type."""
     return control["nmmat"] or sum(
         control[name] for name in ("nummat8", "nummat2", "nummat4", "nummatt", "ngpsph")
     )
@@ -130,7 +130,7 @@ def _order_ids(geometry: Geometry, titles: Titles, number: int) -> tuple[int, ..
 
 
 def _count_values_of_part(values: int, number: int, source: str) -> tuple[int, str]:
-    """Return the number of quantities per part (7, or fewer in older files), or 0 with the reason."""
+    """Return the number of quantities per part (7, or fewer in older files); 0, with a reason, if it is unusable."""
     of_parts = values - GLOBALS
     if number == 0 or of_parts == 0:
         return (
@@ -157,7 +157,7 @@ def _count_walls(values: int, parts: int, of_part: int, words: Words) -> int:
 
 
 def _count_words_of_state(control: Mapping[str, int], geometry: Geometry) -> int:
-    """Count the words of a state: time, global values, nodes, elements, deleted elements, SPH, airbags, roads."""
+    """Count the words of a state: time, global values, nodes, elements, deletions, SPH, airbags and roads."""
     solids = abs(control["nel8"])
     elements = (
         solids * (control["nv3d"] + control["nt3d"])

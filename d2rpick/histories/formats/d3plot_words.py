@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 # Number that marks the end of the geometry, of the titles, and of the states in each file.
 END: Final = -999999.0
 HEAD: Final = 512  # Length of the control words if each word has 8 bytes [bytes].
-# Number of control words in every file; the control word ``extra`` says how many more follow.
+# Number of control words in every file. The control word ``extra`` gives the number of further words.
 CONTROL: Final = 64
 
 _PLACES: Final = {
@@ -35,7 +35,7 @@ _PLACES: Final = {
     "penout": 78, "engout": 79,
 }  # fmt: skip
 _SIGNED: Final = ("nel8", "maxint")  # Control words whose sign is used as a flag.
-# Index of the word that contains the release name; the next word contains the release number.
+# Index of the word with the release name; the next word contains the release number.
 _RELEASE: Final = 13
 _FAMILIES: Final = {1: "d3plot", 3: "d3thdt", 5: "d3part"}
 LONG_IDS: Final = 1000  # Number that is added to the file type if the ids have 8 bytes.
@@ -75,7 +75,7 @@ def detect_form(head: bytes) -> Form | None:
 
 
 def detect_family(head: bytes) -> str | None:
-    """Return the file family (d3plot, d3thdt or d3part) that these first bytes indicate; None for other files."""
+    """Return the file family (d3plot, d3thdt or d3part) of a file with these first bytes; None for any other file."""
     form = detect_form(head)
     if form is None:
         return None
@@ -150,5 +150,5 @@ class Words:
 
 
 def count_dimensions(control: Mapping[str, int]) -> int:
-    """Return the number of coordinates per node; a control word above 3 contains flags as well."""
+    """Return the number of coordinates per node. A control word above 3 contains flags as well."""
     return min(control["ndim"], 3)

@@ -68,9 +68,9 @@ class Blocks(Database):
         The last block if the file ends within it: it is a state only after ``admit_rest``.
     """
 
-    # Shorter sequences of equal blocks do not store the positions of differing bytes, to save memory.
+    # Short sequences of equal blocks do not store the positions of differing bytes, which saves memory.
     many = 64
-    # Number of printed numbers that are converted at a time; these numbers fit into the processor cache.
+    # Number of printed numbers that are converted at a time, so that these numbers fit into the processor cache.
     batch = 1 << 14
 
     def __init__(
@@ -94,7 +94,7 @@ class Blocks(Database):
             lambda at, size: grammar.layout(data[at : min(at + size, end)])
         )
         self._compared = grammar.compare_all
-        # True once a request has compared part of each block.
+        # True once a request has compared a part of each block.
         self._trusted = False
         # Bits that vary between the blocks of a long sequence of equal blocks, keyed by the start of the sequence.
         self._varied: dict[int, Bytes] = {}
@@ -132,14 +132,14 @@ class Blocks(Database):
         """
         is_checked = self._compared or not anchors
         if not is_checked and (self._trusted or not self._alike(names, anchors)):
-            # A second request is usually followed by further requests, so all blocks are compared once.
+            # If a second request occurs, more will usually follow, so all blocks are compared once.
             self._compare_in_full(names)
         self._trusted = self._trusted or bool(anchors)
         taken: dict[int, Fields] = {}
         if tuple(names) == self._asked_ahead:
-            # The copied numbers are used only once, because the caller keeps the result.
+            # Copied numbers are used only once, because the caller keeps the result.
             taken, self._ahead = self._ahead, taken
-        # The operating system allocates the memory of an array of zeros only when something is written to it.
+        # The operating system allocates memory for an array of zeros only when values are written to it.
         values = np.zeros((self.states, len(names)))
         is_scattered = np.ones(self.states, bool)
         row = 0
@@ -149,7 +149,7 @@ class Blocks(Database):
             if run.start in self._varied:
                 self._read(values[rows], run, offsets, taken.get(run.start))
                 is_scattered[rows] = False
-            else:  # The offsets are stored in the array first, and replaced by the numbers below.
+            else:  # The array contains the offsets first, and is then overwritten with the numbers.
                 np.add(
                     _compute_starts(run, 0, run.repeats),
                     offsets,
@@ -166,7 +166,7 @@ class Blocks(Database):
         return values
 
     def admit_rest(self, names: Sequence[Hashable]) -> None:
-        """Use the incomplete last block of a file as a state if it contains these numbers and one more line."""
+        """Use the incomplete last block of a file as a state if it contains these numbers and one further line."""
         if self.rest is None:
             return
         offsets = [
@@ -212,7 +212,7 @@ class Blocks(Database):
     def _read(
         self, values: Samples, run: Stretch, offsets: Addresses, taken: Fields | None
     ) -> None:
-        """Read the numbers of many equal blocks; reuse copied numbers, and read constant numbers only once."""
+        """Read the numbers of many equal blocks. Copied numbers are reused, and constant numbers are read only once."""
         varied_before = np.append(0, np.cumsum(self._varied[run.start] != 0))
         moves = varied_before[offsets + self._grammar.width] > varied_before[offsets]
         still = self._decoded(run.start + offsets[~moves])
@@ -239,7 +239,7 @@ class Blocks(Database):
         )
 
     def _refuse_odd(self, values: Samples, names: Sequence[Hashable]) -> None:
-        """Raise FormatError, with the line, for the first value (states, len(names)) that is not a number."""
+        """Raise FormatError, with the line number, for the first value (states, len(names)) that is not a number."""
         odd = np.isnan(values)
         if not odd.any():
             return
@@ -263,7 +263,7 @@ class Blocks(Database):
         raise AssertionError("the file has this state")
 
     def _offsets(self, run: Stretch, names: Sequence[Hashable]) -> Addresses:
-        """Return the offsets of the named numbers in equal blocks; raise FormatError if one of them is ambiguous."""
+        """Return the offsets of the named numbers in equal blocks; raise FormatError if any of them is ambiguous."""
         layout = self.layout(run.example, run.stride)
         for name in names:
             if layout.fields.get(name, UNSURE) == UNSURE:
@@ -305,7 +305,7 @@ class Blocks(Database):
             self.notes = ("the file ends within a line, which was left out",)
 
     def _is_whole(self, layout: BlockLayout, previous: BlockLayout | None) -> bool:
-        """Return True if a block is complete, i.e. contains the number with which the previous block ends.
+        """Return True if a block is complete, i.e. contains the number that ends the previous block.
 
         If there is no previous block, the grammar decides.
         """
@@ -424,7 +424,7 @@ class Blocks(Database):
     def _alike_in(
         self, run: Stretch, offsets: Addresses, anchors: Sequence[Hashable]
     ) -> bool:
-        """Return True if all blocks of one sequence equal their example, as `_alike` tests for all sequences."""
+        """Return True if all blocks of a sequence equal their example; `_alike` applies this test to all sequences."""
         if run.repeats == 1 and run.start == run.example:
             return True
         layout = self.layout(run.example, run.stride)

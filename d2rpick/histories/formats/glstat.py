@@ -41,10 +41,10 @@ _CONTROL: Final = b"\n dt of cycle"
 # Last line of a state in all known glstat files; mass scaling may add lines after it.
 _LAST: Final = "time per zone cycle.(nanosec)"
 _LINE: Final = re.compile(rb"^ ([A-Za-z][^=\r\n]{29}\.)([^\r\n]*)\r?$", re.MULTILINE)
-# Pattern of a value. Each rigid wall has a separate line, with the number of the wall after the value.
+# Pattern of a value. Each rigid wall has its own line, in which the number of the wall follows the value.
 _VALUE: Final = re.compile(rb".{14}(?: +(wall# *\d+))?(?=[ \t]|$)")
 
-# Pattern of the variable text in other lines: numbers, and the element that controls the time step.
+# Pattern of variable text in other lines: numbers, and the element that controls the time step.
 _CHANGING: Final = re.compile(
     rb" {0,12}[+-]?\d[\d+-]*|(?<= is controlled by )[^\r\n]{1,40}"
 )
@@ -60,7 +60,7 @@ def recognises(data: bytes) -> bool:
 
 
 def open_legs(sources: Sequence[Source], selection: Selection) -> list[Glstat]:
-    """Open each file as a restart segment of the run; an incomplete last state must contain the selected lines."""
+    """Open each file as a restart segment of the run. An incomplete last state must contain the selected lines."""
     return [
         Glstat(source.data, source.name, selection.energy or (_ENERGY,))
         for source in sources
@@ -96,7 +96,7 @@ class Glstat(Blocks):
             self.notes += (
                 "the file has no header; everything before its first time line was left out",
             )
-        # For each line, False if some states lack it although others have it.
+        # False for each line that some states lack although others have it.
         self._even = True
         self._columns = self._pass_over([*names, *springs], [_TIME])
         self.time = self._columns[_TIME]
@@ -105,7 +105,7 @@ class Glstat(Blocks):
         """Return the values of the line ``name``, shape (n,); raise FormatError unless every state has it once."""
         if name not in self._columns:
             wanted = [name]
-            # A request for a further line is usually followed by more requests.
+            # A request for a further line is usually followed by requests for more lines.
             if self._even:
                 names = dict.fromkeys((*self.channels, name))
                 wanted = [label for label in names if label not in self._columns]
@@ -139,7 +139,7 @@ class Glstat(Blocks):
 def _describe_glstat_block(
     block: bytes, lines: Sequence[re.Match[bytes]], literal: Bytes
 ) -> tuple[dict[str, int], str]:
-    """Return the offsets of a block's values, keyed by label, and its last label; UNSURE marks a truncated value."""
+    """Return the offsets of a block's values by label, and its last label. UNSURE marks a truncated value."""
     fields: dict[str, int] = {}
     name, end, is_mixed = "", 0, False
     for line in lines:

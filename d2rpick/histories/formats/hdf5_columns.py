@@ -28,13 +28,13 @@ _PICKLED_NAME: Final = re.compile(rb"^a?V([^\n]*)$", re.MULTILINE)
 _PICKLED_INDEX_NAME: Final = re.compile(
     rb"^s?a?Vindex_name\n(?:p\d+\n)?V([^\n]*)$", re.MULTILINE
 )
-# First characters of the names of groups without histories, such as PyTables index trees and MATLAB references.
+# First characters of the names of groups without histories, e.g. PyTables index trees and MATLAB references.
 _BOOKKEEPING: Final = ("_i_", "#")
 _ERF_BLOCK: Final = "/erfblock"
 # Tables without column names are read if they have at most this number of columns.
 _WIDEST: Final = 64
 
-# Largest dataset that is copied, as a fraction of the file size [-]; a view would keep the whole file in memory.
+# Largest dataset that is copied, as a fraction of the file size [-]; a view keeps the whole file in memory.
 _LARGE: Final = 1 / 4
 
 
@@ -58,7 +58,7 @@ class Column(NamedTuple):
 
     @property
     def is_time(self) -> bool:
-        """True if the name of the column denotes a time; the name in ``time/value`` is ``time``."""
+        """True if the name of the column denotes a time; for ``time/value``, this name is ``time``."""
         group, _, leaf = self.path.rpartition("/")
         if leaf in ("value", "values") and group:
             leaf = group.rpartition("/")[2]
@@ -70,7 +70,7 @@ class Column(NamedTuple):
         return self.dtype.startswith(("int", "uint"))
 
     def load(self, file: h5py.File, content: bytes, source: str) -> Samples:
-        """Return the values of the column, shape (size,), from the ``content`` of the file; all must be finite."""
+        """Return the values of the column, shape (size,), from the file's ``content``; all values must be finite."""
         dataset = file[self.dataset]
         check_data(dataset, source)
         if self.field is None and self.place is None:
@@ -89,7 +89,7 @@ class Column(NamedTuple):
 
 
 def check_data(dataset: h5py.Dataset, source: str) -> None:
-    """Raise FormatError if the type of a dataset is damaged, or if data are missing, which h5py would read as zeros."""
+    """Raise FormatError if a dataset's type is damaged or its data are missing, which h5py would read as zeros."""
     _check_type(dataset, source)
     stored = dataset.id.get_storage_size()
     if too_much := describe_unpacked_excess(stored, dataset.nbytes):
@@ -117,7 +117,7 @@ def check_data(dataset: h5py.Dataset, source: str) -> None:
 
 
 def _check_type(dataset: h5py.Dataset, source: str) -> None:
-    """Raise FormatError for number types that HDF5 does not define; a damaged type would change all numbers."""
+    """Raise FormatError for number types that HDF5 does not define, because a damaged type would change all numbers."""
     for kind in _list_number_types(dataset.id.get_type()):
         if not any(kind.equal(standard) for standard in _list_standard_types()):
             raise FormatError(
@@ -156,7 +156,7 @@ def _list_standard_types() -> tuple[h5py.h5t.TypeID, ...]:
 
 
 def _read_values(dataset: h5py.Dataset, content: bytes) -> Any:
-    """Return the numbers of a dataset; a large contiguous dataset is returned as a view of ``content``."""
+    """Return the numbers of a dataset. A large contiguous dataset is returned as a view of ``content``."""
     # Data in chunks or in external files have no offset in this file.
     start = dataset.id.get_offset()
     if start is None:
@@ -184,7 +184,7 @@ def find_columns(file: h5py.File) -> tuple[Column, ...]:
     import h5py
 
     columns: list[Column] = []
-    # These groups have a layout with a separate reader, which reads them completely.
+    # Groups of this layout have their own reader, which reads them completely.
     read_groups: list[str] = []
 
     def visit(name: str, item: h5py.Group | h5py.Dataset) -> None:
@@ -274,7 +274,7 @@ def _list_erf_columns(name: str, block: h5py.Group) -> Iterator[Column]:
     states = math.prod(times.shape)
     if results.ndim != 3 or states != results.shape[0] or results.shape[2] != 1:
         return
-    # Path of the variable without the zone name (such as ZONE1).
+    # Path of the variable without the name of the zone (such as ZONE1).
     variable = name.removesuffix(_ERF_BLOCK).rpartition("/")[0]
     yield Column(f"{variable}/time", states, str(times.dtype), times.name[1:])
     of_model = "/MODEL/" in variable or "/GLOBAL/" in variable
@@ -314,7 +314,7 @@ def _read_exodus_titles(dataset: h5py.Dataset) -> list[str]:
 def _list_compound_columns(
     name: str, dataset: h5py.Dataset, index_name: str
 ) -> Iterator[Column]:
-    """Yield a column for each member of a compound type, or for each component, which pandas names in an attribute."""
+    """Yield a column for each member of a compound type, or for each component that pandas names in an attribute."""
     if len(dataset.shape) != 1:
         return
     base = name.removesuffix("/table")
@@ -379,7 +379,7 @@ def _list_series_columns(name: str, group: h5py.Group) -> Iterator[Column]:
 
 
 def _list_index_column(name: str, index: h5py.Dataset) -> Iterator[Column]:
-    """Yield the index of a data frame or series, if it consists of numbers."""
+    """Yield the index of a data frame or series if the index consists of numbers."""
     title = _read_attribute_text(index.attrs.get("name"))
     # The pickled form of None is "N.".
     title = "index" if title in ("", "N.") else title

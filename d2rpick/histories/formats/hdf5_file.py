@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.source import Source
 
 SIGNATURE: Final = b"\x89HDF\r\n\x1a\n"
-_MANY: Final = 12  # Largest number of columns listed in a message.
+_MANY: Final = 12  # Largest number of columns that a message lists.
 _BRANCHES: Final = ("glstat", "matsum")
 # Exceptions that h5py raises on damaged files.
 _DAMAGED: Final = (
@@ -54,7 +54,7 @@ _DAMAGED: Final = (
     MemoryError,
 )
 
-# Offset of the end-of-file address in superblock versions 0 to 3. All writers use 8-byte addresses.
+# Offset of the end-of-file address in superblock versions 0 to 3, in which all writers use 8-byte addresses.
 _END_OF_FILE: Final = {0: 40, 1: 44, 2: 28, 3: 28}
 _VERSION, _SIZE, _ADDRESS_SIZE = 8, {0: 13, 1: 13, 2: 9, 3: 9}, 8
 # Time-out of a read in addition to 1 s per 100 kB [s]; a longer read indicates a cyclic B-tree in a damaged file.
@@ -76,7 +76,7 @@ def open_legs(sources: Sequence[Source], selection: Selection) -> list[Database]
 def _open_leg(source: Source, selection: Selection) -> Database:
     """Open one file as a saved binout or as a file of columns."""
     _import_library(source.name)
-    # The file is read into memory: if it changed on disk, the library could crash on a mix of two versions.
+    # The file is read into memory, because a change on disk during the read could crash the library.
     file = io.BytesIO(bytes(source.data))
     check_file(file, source.name)
     if not selection.time and not selection.energy:
@@ -120,7 +120,7 @@ class Columns(Database):
 
     @property
     def energy_channel(self) -> str:
-        """The only column whose name denotes an internal energy, otherwise the only column besides the time.
+        """The only column whose name denotes an internal energy or, failing that, the only column besides the time.
 
         Raise a FormatError that lists all columns if there is no such column.
         """
@@ -284,7 +284,7 @@ class PartGroup(Database):
         return values[:, [part_ids.index(id_) for id_ in ids]]
 
     def _load(self, group: h5py.Group, name: str, shape: tuple[int, ...]) -> Samples:
-        """Return the dataset ``name`` in this ``shape``; the file may omit axes of length 1."""
+        """Return the dataset ``name`` in this ``shape``; the file may lack axes of length 1."""
         dataset = group[name]
         check_data(dataset, self.source)
         if [size for size in dataset.shape if size != 1] != [
@@ -297,7 +297,7 @@ class PartGroup(Database):
 
 
 def _read_parts(group: h5py.Group, source: str) -> tuple[Part, ...]:
-    """Return the parts in the order of the columns; titles belong to ``legend_ids``, which may be in another order."""
+    """Return the parts in the order of the columns. Titles belong to ``legend_ids``, whose order may differ."""
     check_data(group["ids"], source)
     titles: dict[int, str] = {}
     if "legend" in group and "legend_ids" in group:
@@ -326,7 +326,7 @@ def _read_line(group: h5py.Group, name: str) -> str:
 
 
 def _find_named_column(path: str, columns: Sequence[Column], source: str) -> Column:
-    """Return the column with this path; otherwise raise FormatError with a similar path, if any."""
+    """Return the column with this path, or raise a FormatError that suggests a similar path."""
     matching = [column for column in columns if column.path == path.strip("/")]
     near = ""
     if not matching:
@@ -393,7 +393,7 @@ def _import_library(source: str) -> None:
 
 @contextmanager
 def _open_hdf5(file: io.BytesIO, source: str) -> Iterator[h5py.File]:
-    """Open the file; convert any h5py error for a damaged file into a FormatError."""
+    """Open the file, and turn any h5py error about a damaged file into a FormatError."""
     import h5py
 
     try:
@@ -439,7 +439,7 @@ def check_file(file: BinaryIO, source: str, seconds: int = _SECONDS) -> None:
 
 
 def _check_size_of_file(file: BinaryIO, source: str) -> None:
-    """Raise FormatError if the size of a file differs from the size that its header states."""
+    """Raise FormatError if the size of a file differs from the size given in its header."""
     head, size = _head_and_size(file)
     base = 0 if head.startswith(b"\x89HDF") else _USER_BLOCK
     head = head[base:]
@@ -450,7 +450,7 @@ def _check_size_of_file(file: BinaryIO, source: str) -> None:
         or len(head) < offset + _ADDRESS_SIZE
         or head[_SIZE[version]] != _ADDRESS_SIZE
     ):
-        return  # The library reports this problem itself.
+        return  # The library itself reports this problem.
     (end,) = struct.unpack_from("<Q", head, offset)
     if size not in (end, end + base):
         raise FormatError(
@@ -466,7 +466,7 @@ def _head_and_size(file: BinaryIO) -> tuple[bytes, int]:
 
 
 def _read_and_exit(file: BinaryIO, source: str, seconds: int, write_end: int) -> None:
-    """Read all data that could crash the library, write any FormatError message to ``write_end``, and exit."""
+    """Read all data that could crash the library, write the message of any FormatError to ``write_end``, and exit."""
     try:
         import faulthandler
         import resource

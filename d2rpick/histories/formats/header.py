@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 _SHORT: Final = 60  # Largest number of characters of a line quoted in a message.
 # First columns that every version of OpenRadioss' th_to_csv writes.
-# In some versions of th_to_csv, there are more or fewer names than columns (OpenRadioss/Tools, issue 98).
+# In some versions of th_to_csv, the numbers of names and columns differ (OpenRadioss/Tools, issue 98).
 _TH_TO_CSV: Final = (
     *(
         "time",
@@ -36,12 +36,12 @@ _TH_TO_CSV: Final = (
         "hourglassenergy",
     ),
 )
-# Number of columns used (time and first value) if another program writes more names than columns.
+# Number of columns that are used (time and first value) if another program writes more names than columns.
 _SURE_WITHOUT: Final = 2
 
 
 class Header(NamedTuple):
-    """Column names and units, if the file contains them; only the first ``sure`` names are certain."""
+    """Column names and units, if the file contains them. Only the first ``sure`` names are certain."""
 
     names: tuple[str, ...] = ()
     units: tuple[str, ...] = ()
@@ -105,7 +105,7 @@ def quote_start(line: str) -> str:
 
 
 def _count_sure(where: str, names: Sequence[str], columns: int) -> int | None:
-    """Return the number of columns whose names are certain (None: all); raise FormatError if no name is certain."""
+    """Return how many columns have a certain name (None: all of them); raise FormatError if no name is certain."""
     if len(names) == columns:
         return None
     if tuple(map(normalise_name, names[: len(_TH_TO_CSV)])) == _TH_TO_CSV[:columns]:
@@ -119,7 +119,7 @@ def _count_sure(where: str, names: Sequence[str], columns: int) -> int | None:
 
 
 def _join_rows_of_names(rows: Sequence[Sequence[str]], columns: int) -> list[str]:
-    """Join rows of names, from the last row upwards, until all names differ; empty if one row suffices.
+    """Join rows of names, from the last row upwards, until all names differ. Return an empty list if one row suffices.
 
     Examples
     --------
@@ -154,7 +154,7 @@ def _fit(cells: Sequence[str], columns: int) -> list[str]:
 
 
 def _fill_from_left(cells: Sequence[str]) -> list[str]:
-    """Repeat each name, except a time, in the empty cells after it, with which a spreadsheet had merged it."""
+    """Repeat each name, except a time, in the empty cells after it, as if a spreadsheet had merged these cells."""
     filled = [cells[0]]
     for cell in cells[1:]:
         filled.append(cell or (filled[-1] if len(filled) > 1 else ""))
@@ -178,7 +178,7 @@ def _split_rows(
 
 
 def _split_header(line: str, separator: str | None, columns: int) -> list[str]:
-    """Split a header line into names, which may contain single spaces; a line that does not match is one title."""
+    """Split a header line into names, which may contain single spaces. A line of another form is one title."""
     if separator is not None:
         return split_cells(line, separator)
     wide = [cell.strip('"') for cell in re.split(r"\s{2,}|\t", line.strip())]
@@ -191,7 +191,7 @@ def _split_header(line: str, separator: str | None, columns: int) -> list[str]:
 def _find_commented_names(
     lines: Sequence[str], separator: str | None, columns: int
 ) -> tuple[str, ...]:
-    """Return the names in the last comment line, as numpy.savetxt writes it, if they name each column and a time."""
+    """Return the names in the last comment line, as numpy.savetxt writes it, if they name all columns and a time."""
     comments = [line.strip().lstrip("#$%/ ") for line in lines if line.strip()]
     cells = _split_header(comments[-1], separator, columns) if comments else []
     return tuple(cells) if len(cells) == columns and any(map(is_time, cells)) else ()

@@ -29,18 +29,18 @@ if TYPE_CHECKING:
 
 # Text at the start of the LS-DYNA listings d3hsp and messag.
 _LISTING_OF_LS_DYNA: Final = "Livermore Software"
-# Pairs of separator (None: spaces) and decimal sign, in the order in which they are tried.
-# If the separator and the decimal sign are both commas, a row is readable only if its numbers are in quotes.
+# Pairs of a separator (None: spaces) and a decimal sign, in the order in which they are tried.
+# If separator and decimal sign are both commas, a row is readable only if its numbers are in quotes.
 _FORMS = (
     *((sign, decimal) for sign in (";", "\t", "|") for decimal in ".,"),
     *((",", "."), (",", ","), (None, "."), (None, ",")),
 )
 
-# Pattern of the line ``sep=;`` that spreadsheets write above a table; a separator must not be part of a number.
+# Pattern of the line ``sep=;`` that spreadsheets write above a table; a separator cannot be part of a number.
 _SEP_LINE = re.compile(r'(?i:sep=)(?![\w.+"-])([!-~])')
 _DECIMAL_PART = re.compile(r"[+-]?0\d+")
 
-# Number of lines in which the first row is sought in the first attempt.
+# Number of lines that the first attempt searches for the first row.
 _LOOK_AT = 60
 _LINES_SEARCHED = (_LOOK_AT, 600, HEAD)
 
@@ -78,7 +78,7 @@ class Layout(NamedTuple):
         return plain.replace(self.decimal, ".")
 
     def name(self, column: int) -> str:
-        """Return the name of a column in the file, or the column number if it has no name."""
+        """Return the name of a column as given in the file; without a name, return the column number."""
         name = self.names[column] if column < min(len(self.names), self.trusted) else ""
         return name or f"column {column + 1}"
 
@@ -109,7 +109,7 @@ def number_duplicates(names: Sequence[str], kind: str) -> list[str]:
 
 
 def find_layout(text: Text) -> Layout:
-    """Find the layout of a table in its first lines. An unterminated last line is used only if it is the only row.
+    """Find the layout of a table from its first lines. An unterminated last line is used only if no other row exists.
 
     Raises
     ------
@@ -143,12 +143,12 @@ def _add_header(table: Layout, header: Header) -> Layout:
     )
 
 
-def add_thousands(table: Layout, rows: Sequence[Sequence[str]]) -> Layout:
-    """Add the thousands separator without which some cells of ``rows`` would not be numbers."""
+def add_thousands(table: Layout, columns: Sequence[Sequence[str]]) -> Layout:
+    """Add the thousands separator without which some cells of the columns would not be numbers."""
     odd = [
         cell
-        for row in rows
-        for cell in row
+        for cells in columns
+        for cell in cells
         if not has_number(cell, table.decimal, table.thousands) and not is_missing(cell)
     ]
     if odd:
@@ -179,7 +179,7 @@ def _report_no_table(text: Text, lines: Sequence[str]) -> FormatError:
 
 
 def _search_rows(lines: Sequence[str], first: int, separator: str) -> Layout | None:
-    """Search for the rows in a few lines, then in more lines; thousands separators are tried in a second pass."""
+    """Search for the rows in a few lines, then in more lines; the second pass also tries thousands separators."""
     candidates = (
         (number, line)
         for number, line in enumerate(lines)
@@ -213,6 +213,8 @@ def _find_rows(
             if sign and not any(sign in line for _, line in sample):
                 continue
             cells = [(i, split_cells(line, sign)) for i, line in sample]
+            if sum(len(row) > 1 for _, row in cells) <= best_count:
+                continue  # Fewer rows than with an earlier form.
             if with_groups:
                 thousands = find_thousands(
                     [cell for _, row in cells for cell in row], decimal
@@ -246,11 +248,11 @@ def _find_rows(
 def _find_numbers_in_row(
     cells: list[str], form: Layout, only_numbers: bool
 ) -> tuple[bool, ...]:
-    """Return, for each cell of a row, whether it is a number or marks a missing one; empty if the line is not a row."""
-    # Most lines have only one cell, because most of the separators tried are wrong.
+    """Return, for each cell of a row, whether it is a number or marks a missing one; empty if the line is no row."""
+    # Most lines have only one cell here, because most of the separators that are tried are wrong.
     if len(cells) < 2:
         return ()
-    written = [form.number(cell) is not None for cell in cells]
+    written = [has_number(cell, form.decimal, form.thousands) for cell in cells]
     numbers = tuple(
         number or is_missing(cell) for cell, number in zip(cells, written, strict=True)
     )
@@ -265,7 +267,7 @@ def _find_numbers_in_row(
 
 
 def _is_like(kind: tuple[bool, ...], common: tuple[bool, ...]) -> bool:
-    """Return True if a row has the usual number of cells, and numbers wherever most rows have them."""
+    """Return True if a row has the usual number of cells, with numbers wherever most rows have numbers."""
     return len(kind) == len(common) and all(
         is_number or not is_commonly_number
         for is_number, is_commonly_number in zip(kind, common, strict=True)
@@ -275,7 +277,7 @@ def _is_like(kind: tuple[bool, ...], common: tuple[bool, ...]) -> bool:
 def _refuse_odd_rows(
     source: str, lines: Sequence[str], first: int, table: Layout
 ) -> None:
-    """Raise FormatError if a line above the rows begins with a number, because a header line never does."""
+    """Raise FormatError if a line above the rows begins with a number, which a header line never does."""
     for number, line in enumerate(lines[first : table.start], first + 1):
         cells = [] if is_skipped(line) else split_cells(line, table.separator)
         if cells and table.number(cells[0]) is not None:

@@ -80,7 +80,7 @@ class DirectoryLayout(NamedTuple):
 
 
 class _Form(NamedTuple):
-    """The records of a directory as one integer, which is quick to compare with another directory.
+    """The records of a directory as one integer, which can be compared quickly with those of another directory.
 
     ``heads`` are the records without their values; ``fixed`` are these bytes at their positions, ``mask`` selects
     them from ``length`` bytes.
@@ -347,7 +347,7 @@ class Lsda:
         return _Form(heads, len(mask), int.from_bytes(mask), int.from_bytes(fixed))
 
     def _same_again(self, directory: _Directory) -> _Form | None:
-        """Return the layout of the branch's last state if the current state has the same records, otherwise None."""
+        """Return the layout of the branch's last state if the current state has the same records; otherwise None."""
         if not directory.is_state or directory.branch not in self._forms:
             return None
         form = self._forms[directory.branch][1]
@@ -391,7 +391,7 @@ class Lsda:
         return (times - 1) * stride
 
     def _alike(self, previous: int, position: int) -> bool:
-        """Compare records one stride apart; return True if a search for repetitions is worthwhile."""
+        """Compare records that are one stride apart; return True if a search for repetitions is worthwhile."""
         head = self._head.size
         stride = position - previous
         first = self.data[previous : previous + head]

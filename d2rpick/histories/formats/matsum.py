@@ -1,4 +1,4 @@
-"""Read LS-DYNA's matsum, which has one block per state with three or four lines per part.
+"""Read LS-DYNA's matsum, which contains one block per state with three or four lines per part.
 
 The lines of a part begin with ``mat.#=``. Numbers have 13 columns after their name and an equals sign; which names
 there are depends on the version. A legend at the top lists the titles by part number. A part may be in some states
@@ -38,7 +38,7 @@ QUANTITIES: Final[Mapping[str, str]] = {
     "eroded_internal_energy": "eroded_ie",
 }
 
-# Quantities that are adjacent in the file and therefore read together.
+# Quantities that stand next to each other in the file and are therefore read together.
 _AXES: Final = (
     "x_momentum",
     "y_momentum",
@@ -48,7 +48,7 @@ _AXES: Final = (
 _START: Final = b" time ="
 _TIME: Final[tuple[int | None, str]] = (None, "time")
 _MAT: Final = "mat.#"  # Text at the start of the lines of a part.
-# Part number 0, printed as "mat.#=    0"; it stands for lumped masses and their kinetic energy.
+# Part number 0, printed as "mat.#=    0", which stands for lumped masses and their kinetic energy.
 _LUMPED: Final = 0
 # Placeholder for a part number that is damaged, or too long for its columns.
 _UNREADABLE: Final = -1
@@ -67,7 +67,7 @@ _LINE: Final = re.compile(
     re.MULTILINE,
 )
 _FIELD: Final = re.compile(rb" ([a-z_+-]+) ?=([^\r\n]{13}(?=[ \r\n]|\Z))?")
-# A part number has 5 columns, or 8 columns if it is at least 100000; a longer number shifts the rest of the line.
+# A part number has 5 columns, or 8 from 100000 on; a longer number shifts the rest of the line.
 _ID: Final = re.compile(
     rb"(?=[ \d]{4}\d {13}i|(?:  \d{6}| \d{7}|\d{8,18}) {10}i) *(0|[1-9]\d*) +inten="
 )
@@ -173,7 +173,7 @@ class Matsum(Blocks):
         return states
 
     def _remarks(self, present: Counter[int]) -> tuple[str, ...]:
-        """Return notes on parts that are missing in some states, or whose number cannot be read."""
+        """Return notes on parts that are missing in some states or whose number cannot be read."""
         unseen = [id_ for id_ in self._legend if id_ not in present]
         passing = [
             id_ for id_, states in present.items() if id_ > 0 and states < self.states
@@ -213,7 +213,7 @@ class PartColumns(NamedTuple):
 
 
 def write(title: str, time: Samples, parts: Sequence[PartColumns]) -> bytes:
-    """Write a matsum of parts, numbered from 1, with five significant digits; ``time`` has shape (n,)."""
+    """Write a matsum of parts numbered from 1, with five significant digits; ``time`` has shape (n,)."""
     legend = "".join(
         f"{number:9d}     {part.title:<70}\n"
         for number, part in enumerate(parts, start=1)
@@ -258,7 +258,7 @@ def _describe_matsum_block(
     lines: Sequence[re.Match[bytes]],
     literal: Bytes,
 ) -> tuple[dict[tuple[int | None, str], int], tuple[int | None, str]]:
-    """Return the offsets of a block's numbers, keyed by part and name, and its last name; UNSURE if truncated."""
+    """Return the offsets of a block's numbers by part and name, and its last name; UNSURE marks a truncated number."""
     fields: dict[tuple[int | None, str], int] = {}
     part: int | None = None
     doubled = False

@@ -1,4 +1,4 @@
-"""Read uniform rows of numbers at once; the results equal those of `float` with any pandas version."""
+"""Read uniform rows of numbers in one step, with results equal to those of `float` for any pandas version."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
 
 _UNIT_SEPARATOR: Final = "\x1f"  # A control character that does not occur in tables.
-# Largest relative error of pandas' fast number parser [-], which counts leading zeros as digits.
+# Largest relative error of the fast number parser of pandas [-], which treats leading zeros as digits.
 _ROUNDED: Final = 1e-9
 
 
@@ -45,7 +45,7 @@ def read_plain_rows(
         # In all other cases, the parser itself checks that no row lacks cells.
         if not _has_all_cells(piece, layout):
             return None
-        # The first column is read too, because comments appear in it.
+        # The first column is always read, because comments appear in it.
         read_columns = sorted({0, *used})
         if closed or len(read_columns) < layout.columns:
             chosen = read_columns
@@ -57,14 +57,14 @@ def read_plain_rows(
     # bytes.count() is slow if lines are short.
     lines = np.count_nonzero(np.frombuffer(piece, np.uint8) == ord("\n"))
     if table.shape != (lines, len(read_columns)):
-        return None  # The parser skipped blank lines.
+        return None  # The parser has skipped blank lines.
     if read_columns == [*used]:
         return table
     return table[:, np.searchsorted(read_columns, used)]
 
 
 def _remove_quotes(piece: bytes, layout: Layout) -> bytes | None:
-    """Replace the separators of rows with only quoted cells by a control character; None for other rows."""
+    """Replace the separators of rows whose cells are all quoted by a control character; None for other rows."""
     if layout.separator is None:
         return None
     between = f'"{layout.separator}"'.encode("latin-1")
@@ -81,7 +81,7 @@ def _read_with_numpy(
     piece: bytes, layout: Layout, columns: Sequence[int] | None
 ) -> Samples:
     """Read rows of numbers with numpy, in the given columns or in all columns; raise ValueError for other rows."""
-    # Numbers contain no characters outside Latin-1.
+    # Numbers contain only characters of Latin-1.
     lines = piece.decode("latin-1").split("\n")[:-1]
     if not lines[0].strip():
         # numpy skips blank lines, and warns if there are no other lines.

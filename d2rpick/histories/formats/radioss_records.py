@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
 
 INT: Final = struct.Struct(">i")
-# Size of a binary number, and of the record length that precedes and follows each record [bytes].
+# Size of a binary number, and of the length that is written before and after each record [bytes].
 WIDTH: Final = 4
 # Size of the first record [bytes], which contains a code and a title of 80 bytes.
 RUN: Final = 84
@@ -44,7 +44,7 @@ _RUN_TITLE: Final = 72
 _REAL: Final = 16
 _DECIMALS: Final = 8
 _PER_LINE: Final = 5
-# Number of time values at the end of a file that are used to determine the precision.
+# Number of times at the end of a file from which the precision is determined.
 _JUDGED: Final = 100
 
 
@@ -63,7 +63,7 @@ def is_text(head: bytes) -> bool:
 
 
 def open_records(data: Content, source: str) -> Records:
-    """Return the records of a file; raise FormatError for another text format, such as ``/TFILE/2``."""
+    """Return the records of a file; raise FormatError for other text formats, such as ``/TFILE/2``."""
     head = data[:_ROOM]
     begin = _BEGIN.match(head)
     if begin:
@@ -99,7 +99,7 @@ class Records:
         return self._data[begin:end]
 
     def size(self, count: int) -> int:
-        """Return the number of bytes of a record that contains ``count`` reals."""
+        """Return the number of bytes of a record with ``count`` reals."""
         return (count + 2) * WIDTH
 
     def place(self, number: int) -> int:
@@ -107,7 +107,7 @@ class Records:
         return (number + 1) * WIDTH
 
     def marks(self, count: int) -> list[tuple[int, bytes]]:
-        """Return the offset and the bytes of the length marks of every record with ``count`` reals."""
+        """Return the offset and the bytes of the length marks of every record that contains ``count`` reals."""
         length = INT.pack(count * WIDTH)
         return [(0, length), ((count + 1) * WIDTH, length)]
 
@@ -188,7 +188,7 @@ class _TextRecords(Records):
 
     def values(self, fields: Bytes) -> Samples:
         values = parse_fortran_numbers(fields.view(f"S{_REAL}").ravel(), _DECIMALS)
-        # A number with shifted or missing characters can often still be parsed, so columns 3 and 4 are checked as well.
+        # A number with shifted or missing characters can often be parsed, so columns 3 and 4 are checked as well.
         values[(fields[:, 2] == ord(" ")) | (fields[:, 3] != ord("."))] = np.nan
         return values
 

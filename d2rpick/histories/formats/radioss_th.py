@@ -72,7 +72,7 @@ _IMPULSES: Final = ((1, 2, 3), (4, 5, 6))
 
 
 class _Group(NamedTuple):
-    """A group that has a history: its type, the number of its members, and the codes of its variables.
+    """A group that has a history: its type, its number of members, and the codes of its variables.
 
     ``named`` are number and title of each member; empty for a group of neither nodes, interfaces nor rigid walls.
     """
@@ -235,7 +235,7 @@ class TimeHistory(Database):
         return ContactForce.of_impulses(name, self.time, impulses)
 
     def find_resume_points(self) -> dict[str, ResumePoint]:
-        """Return the position at which a later read of the file can begin: the second-to-last complete state."""
+        """Return the position at which a later read can begin, which is that of the second-to-last complete state."""
         begin = self._records.at + self._stride * max(self._states - 2, 0)
         head = self._data[: self._records.at]
         return {self.source: ResumePoint(head, begin, len(self._data))}
@@ -332,7 +332,7 @@ class _HeadRecords:
         self._records = records
         self._most = file_size
         self._source = source
-        # Length of the titles [bytes]; it is the same in all records, and 0 until the first title has been read.
+        # Length of the titles [bytes], which is the same in all records; 0 until the first title has been read.
         self._title = 0
 
     def head(self) -> _Head:
@@ -340,7 +340,7 @@ class _HeadRecords:
         run = self._next(RUN)
         version = clean_text(self._next(80))
         hierarchy = self._next()
-        # Newer releases write a record that gives the number of additional records.
+        # Newer releases write a record with the number of additional records.
         if len(hierarchy) == WIDTH:
             for _ in range(self._count(INT.unpack(hierarchy)[0])):
                 self._next()
@@ -389,7 +389,7 @@ class _HeadRecords:
             id_ = INT.unpack_from(record)[0]
             material, properties, variables = split_integers(record[-3 * WIDTH :])
             codes = self._integers(self._count(variables))
-            # An element group with a history is listed like a part, but has no material and no property.
+            # An element group with a history is listed like a part, but without a material and a property.
             if material or properties:
                 # A solver may write 0 for every variable.
                 nonzero_codes = [code for code in codes if code]
@@ -438,7 +438,7 @@ class _HeadRecords:
         return record
 
     def _integers(self, count: int) -> tuple[int, ...]:
-        """Read a record of ``count`` integers; if ``count`` is 0, the file has no record."""
+        """Read a record of ``count`` integers. If ``count`` is 0, the file contains no such record."""
         return split_integers(self._next(WIDTH * count)) if count else ()
 
     def _count(self, number: int) -> int:
@@ -457,7 +457,7 @@ class _HeadRecords:
         return record
 
     def _broken(self, expected: str) -> FormatError:
-        """Return the error for a header without the expected content."""
+        """Return the error for a header whose content is not as expected."""
         at = self._records.at
         problem = f"{self._source}: {expected} was expected in the head of the time history near byte {at}"
         return FormatError(f"{problem}; the file is cut or damaged, copy it again")

@@ -1,4 +1,4 @@
-"""Read the numbers in the rows of a table; uniform rows are read in large blocks, other rows line by line."""
+"""Read the numbers in the rows of a table. Uniform rows are read in large blocks, other rows line by line."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 class ReadColumns(NamedTuple):
-    """Columns (rows,) of a table in the requested order, and notes on lines that were ignored below the table."""
+    """Columns (rows,) of a table in the requested order, and notes on lines below the table that were ignored."""
 
     columns: list[Samples]
     notes: tuple[str, ...]
@@ -31,7 +31,7 @@ class ReadColumns(NamedTuple):
 def read_columns(
     text: Text, begin: int, layout: Layout, used: Sequence[int]
 ) -> ReadColumns:
-    """Read the columns ``used`` of the rows that start at byte ``begin``; the first of these columns is the time.
+    """Read the columns ``used`` of the rows from byte ``begin`` on; the first of these columns is the time.
 
     Between the rows there may be comments and blank lines; below them words (such as a total) and the same table
     again. A row whose used cells are all empty ends the curve, while a longer curve next to it may go on.
@@ -57,7 +57,7 @@ def read_columns(
 def find_line(
     text: Text, begin: int, layout: Layout, time_column: int, state: int
 ) -> int:
-    """Return the line number of a state; states are counted from 0, lines from 1."""
+    """Return the line number of a state. States are counted from 0, lines from 1."""
     for numbers, _ in _read_tables(
         text, begin, _Curve(text.name, layout, [time_column])
     ):
@@ -70,7 +70,7 @@ def find_line(
 def _read_tables(
     text: Text, begin: int, curve: _Curve
 ) -> Iterator[tuple[Sequence[int], Samples]]:
-    """Yield line numbers and values (rows, used) of each block of rows; irregular rows are read line by line."""
+    """Yield the line numbers and values (rows, used) of each block of rows; irregular rows are read line by line."""
     number = curve.layout.start + 1
     for piece in text.pieces(begin, large=text.is_large):
         table = read_plain_rows(piece, curve.layout, curve.used, is_large=text.is_large)
@@ -93,7 +93,7 @@ def _read_tables(
 
 
 class _Below(NamedTuple):
-    """The first line below the table that is not a row: its number and text, and the error to raise if rows follow."""
+    """The first line below the table that is not a row: its number, its text, and the error to raise if rows follow."""
 
     line: int
     text: str
@@ -101,7 +101,7 @@ class _Below(NamedTuple):
 
 
 class _Curve:
-    """State of the table reader: the states read so far, and the lines found below the table."""
+    """State of the table reader: the states and the lines below the table that have been read."""
 
     def __init__(self, name: str, layout: Layout, used: Sequence[int]) -> None:
         self.layout, self.used = layout, used
@@ -113,14 +113,14 @@ class _Curve:
         # States read so far from the current block of rows.
         self._current: list[list[float]] = []
         self._below: _Below | None = None
-        # Number of states of the table that occur again below it.
+        # Number of states of the table that are repeated below it.
         self._repeated = 0
-        # Line number of the first state that occurs again below the table.
+        # Line number of the first state that is repeated below the table.
         self._repeated_from = 0
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Notes on lines that were ignored below the table."""
+        """Notes on lines below the table that were ignored."""
         if self._below is None:
             return ()
         start = quote_start(self._below.text)
@@ -131,7 +131,7 @@ class _Curve:
         return (f"{omitted} and were left out",)
 
     def add(self, table: Samples) -> None:
-        """Store the states (rows, used) of a block of rows that was read at once."""
+        """Store the states (rows, used) of a block of rows that was read in one step."""
         self._read.append(table)
         self._gap, self._before = False, float(table[-1, 0])
 
@@ -142,7 +142,7 @@ class _Curve:
             self._current.clear()
 
     def stops_before(self, time: float) -> bool:
-        """Return True if a state at this time belongs to another curve or lies below the table."""
+        """Return True if the state at this time belongs to another curve or lies below the table."""
         starts_again = self._gap and self._before is not None and time <= self._before
         return self._ended or starts_again or self._below is not None
 
@@ -172,7 +172,7 @@ class _Curve:
                 yield number, state
 
     def _read_state(self, number: int, row: str) -> list[float] | None:
-        """Return the values of the used columns in a row; None if all are empty and the row is not the first."""
+        """Return the values of the used columns in a row; None if they are all empty and the row is not the first."""
         where = f"{self._name}:{number}"
         cells = _split_row(where, row, self.layout)
         if not any(cells[column] for column in self.used) and self._before is not None:
@@ -183,7 +183,7 @@ class _Curve:
         ]
 
     def _is_below(self, row: str) -> bool:
-        """Return True if a line is not a row, begins with a word and has no time, as lines below a table do."""
+        """Return True if a line is not a row, begins with a word and has no time, like the lines below a table."""
         cells = split_cells(row, self.layout.separator)
         time = cells[self.used[0]] if len(cells) > self.used[0] else ""
         return (
@@ -204,7 +204,7 @@ class _Curve:
             )
 
     def _check_repeated(self, number: int, state: Sequence[float]) -> None:
-        """Raise FormatError unless the rows below a table repeat the rows of that table in their order."""
+        """Raise FormatError unless the rows below a table repeat rows of the table in the same order."""
         self.keep_piece()
         if len(self._read) > 1:
             self._read = [np.concatenate(self._read)]
@@ -235,7 +235,7 @@ class _Curve:
 
 
 def _split_row(where: str, row: str, layout: Layout) -> list[str]:
-    """Split a row into its cells; raise FormatError for a second header or an unexpected number of cells."""
+    """Split a row into its cells; raise FormatError for a second header or a wrong number of cells."""
     cells = split_cells(row, layout.separator)
     if len(cells) == layout.columns + 1 and not cells[-1]:
         cells.pop()
@@ -252,7 +252,7 @@ def _split_row(where: str, row: str, layout: Layout) -> list[str]:
 
 
 def _parse_value(where: str, layout: Layout, column: int, cell: str) -> float:
-    """Return the finite number in a cell; raise FormatError for anything else."""
+    """Return the finite number in a cell; raise FormatError for any other content."""
     value = layout.number(cell)
     if value is None or not np.isfinite(value):
         problem = (

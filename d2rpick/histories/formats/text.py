@@ -30,33 +30,33 @@ _PARTS = re.compile(r"[+-]?(\d*+)\.?+(\d*+)(?:[eEdD]([+-]?\d++))?")
 # Number of significant digits that preserve every double.
 _LONGEST = 17
 _PLAIN = r"[+-]?(?:0|[1-9]\d+)\.\d+"
-# Smallest number of digits that indicates a lossless format; a double preserves all numbers with 15 digits.
+# A format with at least this many digits is treated as lossless, because 15 digits survive conversion to a double.
 _FULL = 15
 
 
 class Text:
-    """The lines of a file, each ending with a line feed; ``unended`` is an unterminated last line, or empty.
+    """The lines of a file, each with a line feed at its end; ``unended`` is an unterminated last line, or empty.
 
     A large file in plain ASCII stays on disk. Raises FormatError for binary data and for a line that is too long.
     """
 
-    # The constants of this class limit how many lines and bytes are read at once.
+    # The constants of this class limit how many lines and bytes are read in one step.
     # Number of lines from which the encoding, separator and header of the text are determined.
     top = HEAD
-    # Number of bytes that are read at a time; their cells fit into the processor cache.
+    # Number of bytes that are read at a time, so that their cells fit into the processor cache.
     piece = 1 << 17
-    # If a text has at most this size [bytes], the printed precision is determined from all fields.
+    # In a text of at most this size [bytes], the printed precision is determined from all fields.
     short = 1 << 16
     # Number of lines that are sampled at the start, at the end and in between if a text is longer.
     some = 100
-    # Number of bytes of a large text that are read at a time; it is high, because each pandas call takes milliseconds.
+    # Number of bytes of a large text that are read at a time; it is large, because each pandas call takes milliseconds.
     large = 1 << 22
 
     def __init__(self, source: Source) -> None:
         self.name = source.name
         self._data, self._encoding = _read_plain_text(source, self.piece)
         self._check_lines()
-        # Offset after the last line that has a line ending [bytes].
+        # Offset after the last complete line [bytes].
         self._end = self._data.rfind(b"\n", 0, len(self._data)) + 1
         self.unended = self._text(self._data[self._end :])
 
@@ -87,7 +87,7 @@ class Text:
 
     @property
     def is_large(self) -> bool:
-        """True if the file stays on disk while it is read; this is possible only for plain ASCII files."""
+        """True if the file stays on disk while it is read, which is possible only for plain ASCII files."""
         return isinstance(self._data, OnDisk)
 
     def pieces(self, begin: int, *, large: bool = False) -> Iterator[bytes]:
@@ -116,7 +116,7 @@ class Text:
         return self._text(piece[:-1]).split("\n")
 
     def sample(self, begin: int) -> list[str]:
-        """Return lines after byte ``begin``: all of a short text, or some at the start, at the end and in between."""
+        """Return lines after byte ``begin``: all lines of a short text, or samples of lines of a long text."""
         data = self._data
         end = self._end
         count = self.some
@@ -221,7 +221,7 @@ def find_precisions(
     """
     digits = 0
     for field in (*energy, *time):
-        if len(field) > digits:  # A field cannot have more digits than characters.
+        if _count_at_most(field) > digits:
             digits = max(digits, _count_significant_digits(field))
         if digits >= _FULL:
             return EXACT, EXACT
@@ -279,6 +279,14 @@ def is_whole_field(field: str, above: Sequence[str]) -> bool:
     return decimals > 1 and padded and not doubtful
 
 
+def _count_at_most(field: str) -> int:
+    """Return an upper limit of the number of significant digits of a field, which costs less than the number."""
+    written = field.lstrip("+-0.")
+    if not written[:1].isdigit():
+        written = field  # The zeros of 0.00000E+00 count.
+    return len(written) - ("." in written)
+
+
 def _count_significant_digits(field: str) -> int:
     """Return the number of significant digits of a field; 0 if the field is not a number."""
     parts = _PARTS.fullmatch(field)
@@ -291,7 +299,7 @@ def _count_significant_digits(field: str) -> int:
 
 
 def _find_fixed_decimals(fields: Sequence[str]) -> int | None:
-    """Return the number of decimals common to all fields without an exponent; None if the numbers differ."""
+    """Return the number of decimals that all fields have in common; None if fields differ or have an exponent."""
     decimals = _decimals(fields[0]) if fields else 0
     are_alike = decimals > 0 and all(_decimals(field) == decimals for field in fields)
     return decimals if are_alike else None
@@ -304,7 +312,7 @@ def _decimals(field: str) -> int:
 
 
 def _is_finer_than_its_grid(decimals: int, moments: Samples) -> bool:
-    """Return True if the times are equally spaced with an interval that needs fewer decimals than ``decimals``."""
+    """Return True if the times are equally spaced and their interval needs fewer decimals than ``decimals``."""
     if moments.size < 3:
         return False
     steps = np.diff(moments)

@@ -1,4 +1,4 @@
-"""Tables as users, spreadsheets and postprocessors write them; pandas reads them with the right options."""
+"""Tables as users, spreadsheets and postprocessors write them, compared with pandas with the right options."""
 
 import io
 from collections.abc import Iterator, Sequence
@@ -72,7 +72,7 @@ def write_table(
 
 
 def lines(head: str, form: str) -> str:
-    """Rows in a form, with t, e, k and the number i of the state."""
+    """Rows in a given form, with t, e, k and the number i of the state."""
     rows = (
         form.format(t=format_number(t), e=format_number(e), k=format_number(k), i=i)
         for i, (t, e, k) in enumerate(zip(TIME, ENERGY, KINETIC, strict=True))
@@ -241,7 +241,7 @@ def test_a_hole_in_the_energy_is_refused_with_its_line() -> None:
         (
             "time;IE\n0,001;1.234\n0,002;1.235\n0,003;1.236\n",
             "1.234",
-        ),  # a thousands separator or a decimal sign: this cannot be known
+        ),  # a thousands separator or a decimal sign, which cannot be decided
         ("time;IE\n1.001;12,5\n1.002;12,6\n1.003;12,7\n", "1.001|12,5"),
         (
             "time,IE\n0.0 ms,0.5 mJ\n0.1 ms,0.6 mJ\n",

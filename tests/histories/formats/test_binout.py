@@ -100,7 +100,7 @@ def test_numbers_of_more_digits_go_on_after_999_999() -> None:
 
 
 def test_a_number_left_out_inside_a_file_says_that_records_are_lost() -> None:
-    """What seems to be one state may then be made of two."""
+    """What looks like one state may then consist of two."""
     run = open_binout(made_binout([1, 2, 3, 5, 6]))
     assert not run.complete
     with pytest.raises(
@@ -124,7 +124,7 @@ def test_states_written_again_by_a_restart_replace_the_older_leg() -> None:
 
 @pytest.mark.parametrize("again", [4, 3])
 def test_a_restart_that_numbers_its_states_anew_goes_on_in_time(again: int) -> None:
-    """The first state of a leg is the last state of the leg before, or the one after it."""
+    """The first state of a leg is the last state of the previous leg, or the one after it."""
     first, second = made_binout([1, 2, 3]), made_binout([1, 2, 3], shift=again - 1)
     (leg,) = binout.open_legs(
         [

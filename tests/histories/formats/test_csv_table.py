@@ -36,7 +36,7 @@ ROWS = [
     '{},"1.5"',
     "{}",
 ]
-# With comma and point as in the file, whatever they mean in the table.
+# Comma and point as in the file, whatever their meaning in the table.
 CELLS = [
     "1_0",
     "0x10",
@@ -307,7 +307,7 @@ def test_the_time_by_name_and_number() -> None:
 
 
 def test_curves_side_by_side_have_times_of_their_own() -> None:
-    """T/HIS writes them like this; a shorter curve ends in empty cells."""
+    """T/HIS writes curves like this; a shorter curve ends in empty cells."""
     assert list_states(read_table(SIDE_BY_SIDE)) == [(0, 1), (1, 3), (2, 4), (3, 6)]
     assert list_states(read_table(SIDE_BY_SIDE, "KE")) == [(0, 5), (0.5, 6)]
     assert read_table(SIDE_BY_SIDE, "KE").time_precision == Precision(digits=1)
@@ -545,7 +545,7 @@ def test_rows_read_piece_by_piece_or_from_the_disk_are_those_read_line_by_line(
 ) -> None:
     good = [
         "{0},{0}.5"
-    ] * 3  # on both sides, since times that step back would hide the error of a cell
+    ] * 3  # on both sides, because times that step back would hide the error of a cell
     numbered = [
         line.format(number) for number, line in enumerate([*good, *lines, *good])
     ]

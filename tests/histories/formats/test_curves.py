@@ -1,4 +1,4 @@
-"""Curves one after the other: what LS-PrePost, T/HIS and DYNAFORM export, and what is refused."""
+"""Curves one after the other, as LS-PrePost, T/HIS and DYNAFORM export them, and texts that are refused."""
 
 import contextlib
 

@@ -223,7 +223,7 @@ def test_a_restart_writes_states_anew_and_the_newer_count(tmp_path: Path) -> Non
 
 @pytest.mark.parametrize("name", ["R712", " R12"])
 def test_rigid_walls_have_their_forces(name: str, tmp_path: Path) -> None:
-    """All releases with such a name have the number 960, yet the states contain positions of rigid walls."""
+    """All releases with such a name have the number 960, but the states contain positions of rigid walls."""
     run = open_family(
         tmp_path,
         D3plotWriter(walls=2, name=name).written(make_states(TIMES, walls=2), 2),
@@ -235,7 +235,7 @@ def test_rigid_walls_have_their_forces(name: str, tmp_path: Path) -> None:
 
 
 def test_parts_that_were_deleted_keep_their_place(tmp_path: Path) -> None:
-    """A deleted part has neither mass nor energy, even if the file still has a velocity of it."""
+    """A deleted part has neither mass nor energy, even if the file still contains a velocity for it."""
     gone = State(
         2.5,
         [4.0, 0.0],

@@ -1,4 +1,4 @@
-"""Damaged binouts and time histories: an error of d2rpick or true numbers, never shifted ones, never a crash.
+"""Damaged binouts and time histories give an error of d2rpick or true numbers, never shifted ones, never a crash.
 
 Structure is damaged at every byte and by hypothesis.  Damage of the numbers themselves cannot be found by anyone and is
 not tried.
@@ -37,7 +37,7 @@ def test_a_binout_cut_at_any_byte_keeps_its_whole_states(tables: bool) -> None:
     for cut in choose_some(range(len(data))):
         whole = sum(
             state < cut for state in states[1:]
-        )  # a state is whole once the next one has begun
+        )  # a state is complete once the next one has begun
         states_read = check_binout(data[:cut])
         assert all(count >= whole for count, _ in states_read)
         assert len(states_read) == 5 or whole < 2
@@ -55,7 +55,7 @@ def test_a_time_history_cut_at_any_byte_keeps_its_whole_states(
     ):
         whole, bytes_left = divmod(cut - begin, stride)
         states_read = file.true(file.data[:cut])
-        # a text may be refused if it is a head only, after which a record begins
+        # a text may be refused if it consists only of a head, after which a record begins
         assert states_read == [(whole, bytes_left == 0)] * 6 or (
             states_read == [] and whole < least
         )
@@ -79,7 +79,7 @@ def test_any_byte_of_structure_may_be_wrong(name: str, flip: int) -> None:
 def test_bytes_inserted_into_a_value_or_lost_from_it_shift_no_number(
     states: int, change: int
 ) -> None:
-    """The damaged record is the one before the address at which the records cannot be followed any more."""
+    """The damaged record is the one before the address from which the records cannot be followed any more."""
     writer = make_binout(range(1, states + 1), PARTS, tables=False)
     data = bytes(writer.data)
     for begin, end in pairwise([*writer.marks, len(data)]):

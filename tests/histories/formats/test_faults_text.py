@@ -1,4 +1,4 @@
-"""Damaged glstat and matsum: an error of d2rpick, or the numbers that a plain reader finds in the lines."""
+"""Damaged glstat and matsum give an error of d2rpick, or the numbers that a plain reader finds in the lines."""
 
 import re
 
@@ -113,7 +113,7 @@ def test_a_first_line_longer_than_any_is_no_fault() -> None:
 def test_states_of_glstat_that_were_blanked_from_line_to_like_line_are_not_lost_silently(
     byte: bytes, line: bytes
 ) -> None:
-    """If bytes between two equal lines are lost, the rest is a state with all lines, one of them very long."""
+    """If bytes between two equal lines are lost, the rest is a state with all lines, one of which is very long."""
     first, last = (borders(GLSTAT, line)[state] for state in (2, 5))
     for inside in (0, 20):
         blank = (

@@ -1,4 +1,4 @@
-"""Numbers copied while blocks are compared are those that are read alone, in damaged files too."""
+"""Numbers copied while blocks are compared equal those that are read individually, in damaged files too."""
 
 import re
 from collections.abc import Callable
@@ -79,7 +79,7 @@ def energies_of_parts(data: bytes, sizes: Sizes) -> tuple[bytes, ...]:
 def answer(
     read: Callable[[bytes, Sizes], tuple[bytes, ...]], data: bytes, sizes: Sizes
 ) -> object:
-    """Return what is read; None if it is refused, for any of the damages."""
+    """Return the content that is read; None if it is refused because of the damage."""
     try:
         return read(data, sizes)
     except FormatError:

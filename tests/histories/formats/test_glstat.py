@@ -1,4 +1,4 @@
-"""glstat: what it may look like and what is refused; every cut gives an error or a true prefix."""
+"""Valid forms of glstat and refused ones; every cut gives an error or a true prefix."""
 
 import re
 
@@ -301,7 +301,7 @@ def test_a_file_cut_anywhere_never_yields_a_wrong_number(energy: str) -> None:
         states_read = list_states(history)
         assert states_read == expected[: len(states_read)]
         outcomes.add(len(states_read))
-        # A file cut between two lines differs from a whole file only by the missing lines.
+        # A file cut between two lines differs from a complete file only by the missing lines.
         assert not history.complete or whole[:cut].rstrip(b" ").endswith(b"\n")
         assert history.complete or history.notes
     assert outcomes == {"error", 1, 2, 3}

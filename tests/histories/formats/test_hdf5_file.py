@@ -1,4 +1,4 @@
-"""HDF5 files of every layout: the numbers that were put in, or a refusal that lists what there is."""
+"""HDF5 files of every layout give the numbers that were put in, or a refusal that lists the contents."""
 
 import io
 import os
@@ -301,7 +301,7 @@ def test_chunks_that_were_never_written_are_no_zeros() -> None:
 
 
 def odd_float() -> h5py.h5t.TypeFloatID:
-    """A double with another exponent bias: all its numbers are four times as large."""
+    """A double with another exponent bias, so that all its numbers are four times as large."""
     kind = h5py.h5t.IEEE_F64LE.copy()
     kind.set_ebias(1021)
     return kind

@@ -1,4 +1,4 @@
-"""What a matsum may look like, and what is refused."""
+"""Valid forms of matsum, and refused ones."""
 
 import numpy as np
 import pytest

@@ -110,7 +110,7 @@ def test_energies_of_the_parts_add_up_to_that_of_the_model(path: str) -> None:
 
 
 def test_the_rollover_agrees_with_the_table_of_its_makers() -> None:
-    """rollover_ref.csv was made apart from these files: seven digits of energies, parts box and step."""
+    """rollover_ref.csv was made independently of these files: seven digits of energies, parts box and step."""
     run = open_history(read_unpacked(BOX))
     table = np.genfromtxt(ROLLOVER, delimiter=",", names=True)
     at = np.searchsorted(run.time, table["time_s"] - 1e-7)

@@ -1,0 +1,381 @@
+"""Define rules D2R112-113 and D2R120-122: constraints on the parts that a card makes rigid.
+
+A node of a rigid body must not obey a second constraint, so constraints on a switched part have to be deleted while the
+part is rigid. Two flags of the cards do this, for all constraints of a kind.  Parts that only a deleted constraint
+connects separate unless they are one rigid body.
+
+Source: vendor keyword data for NRBF (nodal rigid bodies, generalized welds), NCSF (nodal constraints, spotwelds) and
+LRB; the vendor's public modelling rules for rigid bodies, which except joints between rigid bodies.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+from d2rpick.base.errors import choose_verb, name_units
+from d2rpick.deck.ls_dyna_parts import DELETING_FLAGS, read_merged_bodies
+from d2rpick.rules.base import ERROR, WARNING, Case, Objection, group_values
+from d2rpick.rules.rule import (
+    BACK,
+    PASS,
+    THERE,
+    Example,
+    make_deck,
+    make_rule_decorator,
+    set_failing,
+    set_passing,
+    write_automatic_card,
+)
+from d2rpick.rules.switched_parts import find_lead_parts
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+
+    from d2rpick.deck.card import CardField
+    from d2rpick.deck.ls_dyna_parts import Constraint, Kind
+    from d2rpick.deck.switching import SwitchSet
+
+_DELETED = 1  # Value of NRBF or NCSF with which a card deletes constraints.
+_NODAL: Final[tuple[Kind, ...]] = ("nodal rigid body",)
+_OTHERS: Final = tuple(kind for kind in DELETING_FLAGS if kind not in _NODAL)
+
+_COUNTS: Final = "         0         0         0       0.0         1         0"
+_MESH: Final = "*ELEMENT_SHELL\n       1       1       1       2       3       4\n"
+_TWO_PARTS: Final = _MESH + "       2       2       5       6       7       8\n"
+_SET: Final = "*SET_NODE_LIST\n         5\n         3         4        99\n"
+_BODY: Final = "*CONSTRAINED_NODAL_RIGID_BODY\n         9         0         5\n"
+_EXTRA: Final = "*CONSTRAINED_EXTRA_NODES_NODE\n         8         3\n"
+_JOINT: Final = (
+    "*CONSTRAINED_JOINT_REVOLUTE\n"
+    + "".join(f"{node:10d}" for node in (3, 3, 50, 51, 52, 53))
+    + "\n"
+)
+_SPOTWELD: Final = "*CONSTRAINED_SPOTWELD\n         3        99\n"
+_JOINING_BODY: Final = _SET.replace("4  ", "6  ") + _BODY
+_JOINING_JOINT: Final = _JOINT.replace("3         3        50", "3         6        50")
+_HELD_JOINT: Final = _JOINT.replace(
+    "3         3        50", "         99         6        50"
+)
+_JOINING_WELD: Final = _SPOTWELD.replace("99", " 6")
+_MERGED: Final = "*CONSTRAINED_RIGID_BODIES\n         1         2\n"
+
+
+def _make_constrained_deck(text: str, flags: str = "         0         0") -> Example:
+    """Return a deck with a constraint on a node of part 1; ``flags`` are the values of NRBF and NCSF on its card."""
+    rigid_card = THERE.replace(_COUNTS, flags + _COUNTS[20:])
+    return make_deck(_MESH + _SET + text + rigid_card + BACK)
+
+
+def _make_joined_deck(text: str, flags: str, *lines: str) -> Example:
+    """Return a deck in which a constraint joins two parts; ``lines`` are the D2R lines of the first card.
+
+    ``flags`` are NRBF and NCSF of the first card; the second card activates what the first deletes.
+    """
+    rigid_card = write_automatic_card(1, "0.02", rigid=lines)
+    back_card = write_automatic_card(2, "0.09", deformable=["1", "2"][: len(lines)])
+    deleting = rigid_card.replace(_COUNTS[:40], flags + _COUNTS[20:40], 1)
+    activated = flags.replace("1", "2") + _COUNTS[20:40]
+    activating = back_card.replace(_COUNTS[:40], activated, 1)
+    return make_deck(_TWO_PARTS + text + deleting + activating)
+
+
+class _Flags(NamedTuple):
+    """The flags NRBF and NCSF on a card that makes parts rigid, and the field of the first of these flags."""
+
+    nrbf: int
+    ncsf: int
+    place: CardField
+
+    def describe(self, kind: Kind) -> str:
+        """Return the flags for a kind of constraint with their values, such as 'NRBF 0 and NCSF 0'."""
+        return " and ".join(
+            f"{name} {self._value(name)}" for name in DELETING_FLAGS[kind]
+        )
+
+    def deletes(self, kind: Kind) -> bool:
+        """Return True if the card deletes the constraints of a kind."""
+        return any(self._value(name) == _DELETED for name in DELETING_FLAGS[kind])
+
+    def _value(self, name: str) -> int:
+        return self.nrbf if name == "NRBF" else self.ncsf
+
+
+def _find_flags(case: Case, card: SwitchSet) -> _Flags | None:
+    """Return the flags of a card. Restarts have them on *RIGID_DEFORMABLE_CONTROL, and plain cards have none."""
+    if card.header:
+        nrbf = card.header.nrbf
+        ncsf = card.header.ncsf
+        return _Flags(nrbf.value, ncsf.value, nrbf.field)
+    if card.kind != "restart":
+        return None
+    controls = (
+        control
+        for control in case.sets
+        if control.card.file == card.card.file
+        and control.card.name.endswith("_CONTROL")
+    )
+    values = next((control.values for control in controls if control.values), None)
+    if values is None:
+        return _Flags(0, 0, card.card.here)
+    nrbf_value = values[0].value
+    ncsf_value = values[1].value
+    return _Flags(int(nrbf_value), int(ncsf_value), values[0].field)
+
+
+class _Joining(NamedTuple):
+    """A constraint and the parts that it joins.
+
+    ``deformable`` are those of the ``parts`` that no card makes rigid. ``body_count`` is the number of rigid bodies to
+    which the other parts belong. ``flags`` are those of the cards that make parts rigid, keyed by part id.
+    """
+
+    constraint: Constraint
+    parts: frozenset[int]
+    deformable: frozenset[int]
+    body_count: int
+    flags: Mapping[int, Sequence[_Flags]]
+
+    @property
+    def is_one_body(self) -> bool:
+        """Return True if all parts become one rigid body."""
+        return self.body_count == 1 and not self.deformable
+
+    @property
+    def name(self) -> str:
+        """Return the kind of the constraint, with its id if it has one."""
+        if self.constraint.id:
+            return f"{self.constraint.kind} {self.constraint.id}"
+        return self.constraint.kind
+
+    def find_card(self, *, deletes: bool) -> tuple[int, _Flags] | None:
+        """Return the first part made rigid by a card that deletes the constraint, or keeps it, and the card's flags."""
+        kind = self.constraint.kind
+        cards = (
+            (part, flags)
+            for part in sorted(self.flags)
+            for flags in self.flags[part]
+            if flags.deletes(kind) == deletes
+        )
+        return next(cards, None)
+
+
+def _find_joinings(case: Case, kinds: Sequence[Kind]) -> Iterator[_Joining]:
+    """Yield the constraints of the given kinds on parts that a card makes rigid."""
+    flags = group_values(
+        (event.unit.id, flags)
+        for event in case.made_rigid
+        if (flags := _find_flags(case, event.by))
+    )
+    if not flags:
+        return
+    leads = find_lead_parts(
+        {event.unit.id: event for event in reversed(case.made_rigid)}
+    )
+    constraints = [item for item in case.constraints if item.kind in kinds]
+    parts_of_nodes = case.parts_of_constrained_nodes
+    for constraint in constraints:
+        parts = {
+            part for node in constraint.nodes for part in parts_of_nodes.get(node, ())
+        }
+        rigid = {part for part in parts if case.parts.is_rigid(part)}
+        if constraint.part:
+            # Extra nodes belong to a part that is rigid from the start, or to a switched part.
+            parts.add(constraint.part)
+            rigid.add(constraint.part)
+        bodies = {leads.get(part, part) for part in parts & (leads.keys() | rigid)}
+        on_parts = {part: flags[part] for part in parts & flags.keys()}
+        if on_parts:
+            yield _Joining(
+                constraint,
+                frozenset(parts),
+                frozenset(parts - leads.keys() - rigid),
+                len(bodies),
+                on_parts,
+            )
+
+
+def _find_active(
+    case: Case, kinds: Sequence[Kind], rule_of_deleted: str
+) -> Iterator[Objection]:
+    """Yield constraints on parts that a card makes rigid without deleting these constraints.
+
+    ``rule_of_deleted`` is the rule that reports a deleted constraint between parts that then separate.
+    """
+    for joining in _find_joinings(case, kinds):
+        keeping = joining.find_card(deletes=False)
+        if keeping is None:
+            continue
+        part, flags = keeping
+        described = flags.describe(joining.constraint.kind)
+        problem = (
+            f"{joining.name} on part {part}, which is made rigid at {flags.place.at} with {described}, "
+            "so it stays active"
+        )
+        cure = "set the flag to 1 there and to 2 on the card that switches back"
+        if joining.deformable:
+            held = (
+                f"it also holds {name_units(joining.deformable)}, so do not delete it"
+            )
+            cure = (
+                f"{held} ({rule_of_deleted}): make all its parts rigid, or none of them"
+            )
+        elif not joining.is_one_body:
+            held = f"its {name_units(joining.parts)} become separate rigid bodies"
+            cure = f"{held} ({rule_of_deleted}): merge them by LRB, and {cure}"
+        yield joining.constraint.place, f"{problem}; {cure}"
+
+
+def _find_separating(case: Case, kinds: Sequence[Kind]) -> Iterator[Objection]:
+    """Yield constraints that a card deletes although their parts do not become one rigid body."""
+    for joining in _find_joinings(case, kinds):
+        deleting = joining.find_card(deletes=True)
+        if deleting is None or joining.is_one_body:
+            continue
+        described = deleting[1].describe(joining.constraint.kind)
+        problem = f"{joining.name} joins {name_units(joining.parts)} and is deleted ({described})"
+        if joining.deformable:
+            verb = choose_verb(joining.deformable)
+            left = f"{name_units(joining.deformable)} {verb} not made rigid"
+            message = f"{problem}, but {left}; switch all"
+        else:
+            message = (
+                f"{problem}, but they become separate rigid bodies; merge them by LRB"
+            )
+        yield joining.constraint.place, message
+
+
+@set_passing(
+    PASS,
+    _make_constrained_deck(_BODY, "         1         0"),
+    _make_constrained_deck(_BODY.replace("   5\n", "   6\n")),
+)
+@set_failing(
+    _make_constrained_deck(_BODY),
+    _make_constrained_deck(_BODY, "         2         1"),
+)
+@make_rule_decorator(
+    "D2R112", ERROR, "a nodal rigid body on a switched part stays active (NRBF)"
+)
+def _check_nodal_bodies(case: Case) -> Iterator[Objection]:
+    """A node cannot belong to two rigid bodies. The card that makes a part rigid must delete the nodal rigid bodies on
+    it, and the card that switches back must activate them again. Otherwise the run stops (Error 30164, as a public drop
+    tool reports). Source: vendor keyword data for NRBF, according to which such bodies cause instabilities.
+
+    Fix: Set NRBF to 1 on the card that makes the part rigid and to 2 on the card that switches it back. If the body
+    also holds a part that stays deformable, do not delete it (D2R120): switch both parts, or neither.
+    """
+    return _find_active(case, _NODAL, "D2R120")
+
+
+@set_passing(
+    PASS,
+    _make_joined_deck(
+        _JOINING_BODY, "         1         0", "1", "         2         1      PART"
+    ),
+)
+@set_failing(
+    _make_joined_deck(_JOINING_BODY, "         1         0", "1", "2"),
+    _make_joined_deck(_JOINING_BODY, "         1         0", "1"),
+)
+@make_rule_decorator(
+    "D2R120", ERROR, "a deleted nodal rigid body (NRBF 1) that joins separate bodies"
+)
+def _check_separated_parts(case: Case) -> Iterator[Objection]:
+    """While NRBF 1 deletes a nodal rigid body, only the rigid body of its parts connects them. The parts that it joins
+    separate if they become several rigid bodies, or if one of them is not switched. Source: vendor keyword data for
+    NRBF and LRB.
+
+    Fix: Switch all parts of the body and merge them by LRB, or switch none of them.
+    """
+    return _find_separating(case, _NODAL)
+
+
+@set_passing(
+    PASS,
+    _make_constrained_deck(_EXTRA, "         0         1"),
+    _make_constrained_deck(_JOINT, "         1         0"),
+    _make_constrained_deck(_SPOTWELD, "         0         1"),
+)
+@set_failing(
+    _make_constrained_deck(_EXTRA),
+    _make_constrained_deck(_JOINT),
+    _make_constrained_deck(_EXTRA.replace("  8  ", "  1  ")),
+    _make_constrained_deck(_SPOTWELD, "         1         0"),
+)
+@make_rule_decorator(
+    "D2R113",
+    WARNING,
+    "extra nodes, a joint or a weld on a switched part stays active (NRBF, NCSF)",
+)
+def _check_other_constraints(case: Case) -> Iterator[Objection]:
+    """Extra nodes, joints, spotwelds, rivets, generalized welds and constrained node sets constrain nodes. On a part
+    that a card makes rigid, these nodes also belong to its rigid body. According to the vendor, such constraints are
+    invalid for a rigid body: they must be deleted while the part is rigid, and activated again when it is switched
+    back. NCSF deletes spotwelds and other nodal constraints, such as rivets and constrained node sets. NRBF deletes
+    generalized welds. No available source states which flag deletes joints and extra nodes, so NRBF 1 or NCSF 1
+    satisfies this rule.
+
+    Fix: Set the flag to 1 on the card that makes the part rigid and to 2 on the card that switches it back: NCSF for
+    spotwelds, rivets and node sets, NRBF for generalized welds, both for joints and extra nodes. If the constraint
+    joins parts that do not become one rigid body, merge them by LRB first (D2R121).
+    """
+    return _find_active(case, _OTHERS, "D2R121")
+
+
+@set_passing(
+    PASS,
+    _make_joined_deck(
+        _JOINING_JOINT, "         0         1", "1", "         2         1      PART"
+    ),
+    _make_joined_deck(_JOINING_WELD, "         1         0", "1", "2"),
+)
+@set_failing(
+    _make_joined_deck(_JOINING_JOINT, "         0         1", "1", "2"),
+    _make_joined_deck(_SET + _BODY + _HELD_JOINT, "         1         0", "1", "2"),
+    _make_joined_deck(_JOINING_WELD, "         0         1", "1"),
+)
+@make_rule_decorator(
+    "D2R121",
+    WARNING,
+    "a deleted joint, weld or set of extra nodes (NRBF 1, NCSF 1) that joins separate bodies",
+)
+def _check_separated_joints(case: Case) -> Iterator[Objection]:
+    """While NRBF 1 or NCSF 1 deletes a joint, weld or extra nodes, only the rigid body of the parts connects them. The
+    parts separate if they become several rigid bodies, or if one of them stays deformable. A joint may also be held by
+    nodal rigid bodies on the parts, which NRBF 1 deletes. Source: vendor keyword data for NRBF, NCSF and LRB. It is not
+    tested whether the flags act on joints and extra nodes, so the rule only warns.
+
+    Fix: Switch all parts and merge them by LRB. If they move relative to each other in the flight, like a door on its
+    hinge, keep all of them deformable.
+    """
+    return _find_separating(case, _OTHERS)
+
+
+@set_passing(
+    PASS,
+    make_deck(_MERGED.replace("1         2", "7         8") + THERE + BACK),
+)
+@set_failing(
+    make_deck(_MERGED + THERE + BACK),
+    make_deck(_MERGED.replace("1         2", "2         1") + THERE + BACK),
+)
+@make_rule_decorator("D2R122", WARNING, "a switched part on *CONSTRAINED_RIGID_BODIES")
+def _check_merged_bodies(case: Case) -> Iterator[Objection]:
+    """*CONSTRAINED_RIGID_BODIES merges rigid bodies whose parts have *MAT_RIGID. A part that a card makes rigid has a
+    deformable material, so the keyword does not apply to it, and the parts become separate rigid bodies unless the card
+    merges them. Source: the vendor's public help on the command that writes this keyword. Not tested with the solver.
+
+    Fix: Remove the part from *CONSTRAINED_RIGID_BODIES, and merge the parts with LRB on the card.
+    """
+    switched = {
+        event.unit.id
+        for event in case.made_rigid
+        if not case.parts.is_rigid(event.unit.id)
+    }
+    for place, merged in read_merged_bodies(case.deck) if switched else ():
+        if named := sorted(switched.intersection(merged)):
+            problem = f"{name_units(named)} {choose_verb(named)} made rigid by a card"
+            yield (
+                place,
+                f"{problem}, but this keyword merges only *MAT_RIGID parts; remove it, and merge by LRB on the card",
+            )

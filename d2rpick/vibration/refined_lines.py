@@ -1,0 +1,201 @@
+"""Refine spectral lines in noise by least squares, and add the lines that the subspace of the whole record misses.
+
+The poles of shift invariance (`lines`) are not those of the smallest misfit.  A line that dies early is weak in the
+whole record, so noise may take its place in the subspace, although the first part of the record shows it; and a line
+that stands out of the misfit is none of noise.  Such lines are added if the misfit falls by more than chance allows.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from d2rpick.base.tuples import NamedTuple
+from d2rpick.vibration.fitting import measure_structure
+from d2rpick.vibration.lines import (
+    MOST_GROWTH,
+    PERFECT,
+    are_lines,
+    fit_weights,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from d2rpick.histories.history import Samples
+    from d2rpick.vibration.lines import Complex, Grid, Prediction, Spectrum
+
+# Largest number of refinement steps; three are usual.
+_MOST_STEPS: Final = 6
+# Fractions of a step that are tried until the misfit falls.
+_STEP_LENGTHS: Final = (1.0, 0.5, 0.25)
+# The refinement ends if a step raises twice the logarithm of the likelihood by less than this [-].
+_CONVERGED: Final = 0.1
+# Largest factor by which a step may raise the sum of the heights; lines that cancel each other are fitted to noise [-].
+_MOST_INFLATED: Final = 1.1
+# Relative damping of the normal equations, which lines that cannot be told apart would make singular [-].
+_DAMPING: Final = 1e-9
+# Largest number of parameters per state of the grid [-].
+_MOST_PARAMETERS: Final = 0.5
+# A further line has this number of parameters: two for its weight and two for its pole.
+_OF_A_LINE: Final = 4
+# A further line must raise twice the logarithm of the likelihood by this more than the Bayesian information
+# criterion demands (Schwarz, Annals of Statistics 6, 1978) [-]; it is chosen from as many lines as there are states.
+_BEYOND_CHOICE: Final = 6.0
+# Lines of the first part are missing if no line of the record has a frequency within this [cycles over the record].
+_SAME_LINE: Final = 0.5
+# Exponents by which a line may decay over the record, tried in the search for lines in a misfit [-].
+_DECAYS: Final = (0.0, 2.0, 6.0)
+# Largest exponent by which an added line may decay over the record; a faster decay would fit a few states of a load.
+_MOST_DECAY: Final = 8.0
+# Largest number of lines that are added because they stand out of the misfit.
+_MOST_OF_REST: Final = 3
+# Number of points per cycle over the record at which the spectrum of a misfit is evaluated.
+_FINER: Final = 2
+# Frequencies up to this are treated as part of the mean [cycles over the record].
+_OF_MEAN: Final = 1.0
+
+
+def refine_prediction(grid: Grid, prediction: Prediction) -> Prediction:
+    """Return the prediction after refining the lines of the whole record, if they leave noise and nothing else.
+
+    The lines of the first part stay the same, since they only test the others.
+    """
+    spectrum = prediction.spectrum
+    if spectrum.error <= PERFECT * prediction.swing or not spectrum.lines.poles.size:
+        return prediction
+    spectrum = _refine_spectrum(grid, spectrum)
+    for pole in _list_missing_poles(spectrum, prediction.of_first_part, grid):
+        spectrum = _add_line(grid, spectrum, pole) or spectrum
+    for _ in range(_MOST_OF_REST):
+        strongest = _find_strongest_in_rest(grid, spectrum.rest)
+        # The shape of a candidate is not refined yet, so half of the gain is enough at this stage.
+        if strongest.gain < _get_needed_gain(grid) / 2:
+            break
+        extended = _add_line(grid, spectrum, strongest.pole)
+        if extended is None:
+            break
+        spectrum = extended
+    # Least squares gives the best lines only if the misfit is noise; lines may also be fitted to the end of a load.
+    is_noise = measure_structure(spectrum.rest) == 0
+    return prediction._replace(spectrum=spectrum) if is_noise else prediction
+
+
+def _refine_spectrum(grid: Grid, spectrum: Spectrum) -> Spectrum:
+    """Reduce the misfit by the Gauss-Newton method; the poles of the mean are kept, the weights follow from the poles.
+
+    If no step reduces the misfit, the spectrum is returned as it is.
+    """
+    for _ in range(_MOST_STEPS):
+        step = _compute_step_of_poles(grid, spectrum)
+        better = next(_try_steps(grid, spectrum, step), None)
+        if better is None:
+            break
+        gain = _compute_gain(spectrum, better)
+        spectrum = better
+        if gain < _CONVERGED:
+            break
+    return spectrum
+
+
+def _compute_step_of_poles(grid: Grid, spectrum: Spectrum) -> Complex:
+    """Return the change of the poles, shape (k,), that would remove the misfit if all parameters acted linearly."""
+    averaged = spectrum.average_blocks(grid)
+    times = grid.time
+    count = spectrum.lines.poles.size
+    design = np.hstack(
+        [averaged.lines.differentiate(times), averaged.mean.waves(times).real]
+    )
+    if design.shape[1] > _MOST_PARAMETERS * times.size:
+        return np.zeros(count, np.complex128)
+    scale = np.maximum(np.linalg.norm(design, axis=0), 1e-300)
+    design /= scale
+    normal = design.T @ design + _DAMPING * np.eye(scale.size)
+    step = np.linalg.solve(normal, design.T @ spectrum.rest) / scale
+    decay, rate = step[2 * count : 3 * count], step[3 * count : 4 * count]
+    return np.asarray(decay + 1j * rate)
+
+
+def _try_steps(grid: Grid, spectrum: Spectrum, step: Complex) -> Iterator[Spectrum]:
+    """Yield the spectra with a smaller misfit after a full step of the poles, then after shorter ones."""
+    for length in _STEP_LENGTHS:
+        poles = spectrum.lines.poles + length * step
+        growth = np.minimum(poles.real, MOST_GROWTH / grid.span)
+        poles = growth + 1j * poles.imag
+        is_aliased = poles.imag * grid.step >= np.pi
+        if are_lines(poles, grid.span).all() and not is_aliased.any():
+            moved = fit_weights(grid, poles, spectrum.mean.poles)
+            is_inflated = _sum_sizes(moved) > _MOST_INFLATED * _sum_sizes(spectrum)
+            if moved.error < spectrum.error and not is_inflated:
+                yield moved
+
+
+def _sum_sizes(spectrum: Spectrum) -> float:
+    """Return the sum of the heights of all lines at the first time [energy]."""
+    return float(np.abs(spectrum.lines.weights).sum())
+
+
+def _list_missing_poles(
+    spectrum: Spectrum, of_first_part: Spectrum, grid: Grid
+) -> list[complex]:
+    """Return the poles of the first part's lines that the record's lines do not contain, strongest lines first."""
+    lines = of_first_part.lines
+    apart = np.abs(np.subtract.outer(lines.poles.imag, spectrum.lines.poles.imag))
+    is_missing = apart.min(axis=1) * grid.span > 2 * np.pi * _SAME_LINE
+    strongest_first = np.argsort(-np.abs(lines.weights))
+    poles = lines.poles[strongest_first][is_missing[strongest_first]]
+    return [complex(pole) for pole in poles]
+
+
+def _add_line(grid: Grid, spectrum: Spectrum, pole: complex) -> Spectrum | None:
+    """Return the spectrum with a further line, all lines refined; None if the misfit falls by no more than chance."""
+    poles = np.append(spectrum.lines.poles, pole)
+    if not are_lines(poles, grid.span).all():
+        return None
+    extended = _refine_spectrum(grid, fit_weights(grid, poles, spectrum.mean.poles))
+    is_needed = _compute_gain(spectrum, extended) > _get_needed_gain(grid)
+    is_lasting = -extended.lines.poles[-1].real * grid.span < _MOST_DECAY
+    return extended if is_needed and is_lasting else None
+
+
+def _get_needed_gain(grid: Grid) -> float:
+    """Return by how much a further line must raise twice the logarithm of the likelihood [-]."""
+    return float(_OF_A_LINE * np.log(grid.time.size)) + _BEYOND_CHOICE
+
+
+def _compute_gain(spectrum: Spectrum, better: Spectrum) -> float:
+    """Return twice the increase of the logarithm of the likelihood, for a misfit of white noise [-].
+
+    Each parameter takes a state from those that show what the misfit is.
+    """
+    least = max(better.error, 1e-300)
+    parameters = _OF_A_LINE * better.lines.poles.size + better.mean.poles.size
+    freedom = max(better.rest.size - parameters, 1)
+    return float(2 * freedom * np.log(max(spectrum.error, least) / least))
+
+
+class _Candidate(NamedTuple):
+    """A line that a misfit may contain: its ``pole`` [1/time], and the ``gain`` of adding it as it is [-]."""
+
+    pole: complex
+    gain: float
+
+
+def _find_strongest_in_rest(grid: Grid, rest: Samples) -> _Candidate:
+    """Find the decaying line that reduces a misfit (m,) most, by matched filters for a few decays."""
+    since_start = grid.time - grid.time[0]
+    count = rest.size
+    variance = max(float(np.mean(rest**2)), 1e-300)
+    candidates = []
+    for decay in _DECAYS:
+        course = np.exp(-decay * since_start / grid.span)
+        transform = np.fft.rfft(rest * course, _FINER * count)
+        # A wave and its quadrature, each with half of the course's sum of squares, fit independent parts.
+        gains = 2 * np.abs(transform) ** 2 / (variance * np.sum(course**2))
+        gains[: int(_FINER * _OF_MEAN) + 1] = 0.0
+        strongest = int(np.argmax(gains))
+        rate = 2 * np.pi * strongest / (_FINER * count * grid.step)
+        pole = complex(-decay / grid.span, rate)
+        candidates.append(_Candidate(pole, float(gains[strongest])))
+    return max(candidates, key=lambda candidate: candidate.gain)
