@@ -343,8 +343,15 @@ class PairSuggestion(AnswerAtTd):
 
     @property
     def _good_pair(self) -> Pair | None:
-        """Another pair with a clearly smaller residual of at most 0.5; None if there is no such pair."""
-        return _drop_poor(self.clearly_better)
+        """Another pair, clearly better than the recommended one and not poor; None if there is no such pair.
+
+        A residual above 0.5 is poor unless the next contact makes it negligible.
+        """
+        better = self.clearly_better
+        if better is None or _drop_poor(better):
+            return better
+        decision = self.decision_on_better
+        return better if decision and decision.grade != POOR else None
 
     @cached_property
     def decision_on_better(self) -> Decision | None:
@@ -432,13 +439,17 @@ def compare_in_flight(
 ) -> Decision:
     """Add to the decision on a pair a clearly better pair of the same flight, or the td range without a better pair.
 
-    The flight is searched only if another time may be better, and no better pair is known yet.
+    The flight is searched only if another time may be better, and no better pair whose residual is at most 0.5 is yet
+    known.
     """
     is_refused = decision.objections or decision.grade != decision.quality.grade
     needs_other_times = is_refused or any(
         cause.needs_other_times for cause in decision.quality.causes
     )
-    if decision.grade == GOOD or decision.better or not needs_other_times:
+    if decision.grade == GOOD or not needs_other_times:
+        return decision
+    known = decision.better
+    if known and (known.residual is None or known.residual <= POOR_RESIDUAL):
         return decision
     choice = _choose_in_flight(situation)
     if choice is None or choice.recommended is None or choice.decision is None:
@@ -449,7 +460,7 @@ def compare_in_flight(
         is_better = _has_smaller_residual(choice.recommended, candidate)
     if is_better:
         return decision._replace(better=choice.recommended)
-    return decision._replace(best_of=choice.compared_td)
+    return decision if known else decision._replace(best_of=choice.compared_td)
 
 
 def _choose_in_flight(situation: Situation) -> PairSuggestion | None:
@@ -699,7 +710,7 @@ def _add_choice_in_flight(answer: PairSuggestion) -> PairSuggestion:
         if choice and is_usable:
             return replace(answer, better_pair=choice.recommended)
         return answer
-    if decision is None or decision.better:
+    if decision is None:
         return answer
     decision = compare_in_flight(decision, answer.situation, best)
     if decision.better:

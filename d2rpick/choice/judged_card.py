@@ -188,5 +188,7 @@ def _describe_verdict(verdict: PairVerdict, which: str) -> Iterator[str]:
 
 
 def _format_as_sentence(text: str) -> str:
-    """Return a reason as a sentence, with a capital letter and a full stop."""
+    """Return a reason as a sentence, with a capital letter, unless it begins with a symbol, and a full stop."""
+    if text.startswith(("tr ", "td ")):
+        return f"{text}."
     return f"{text[:1].upper()}{text[1:]}."

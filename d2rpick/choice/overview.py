@@ -49,6 +49,8 @@ if TYPE_CHECKING:
     from d2rpick.histories.run import OpenedRun
 
 
+# Smallest number of states from which times can be chosen.
+_FEWEST: Final = 3
 # Name of the Radioss output that contains the part momenta.
 _RADIOSS: Final = "/TH/PART with DEF, MASS and HE for all parts"
 _LS_DYNA: Final = "*DATABASE_MATSUM"
@@ -125,6 +127,9 @@ class Overview(NamedTuple):
         """Reason for the verdict."""
         if self.unjudged:
             return "; ".join(caution.message for caution in self.unjudged)
+        if not self.flights and self.states is not None and self.states < _FEWEST:
+            states = f"{self.states} state{'s' * (self.states != 1)}"
+            return f"the files contain {states}, at least {_FEWEST} were expected"
         if not self.flights:
             return "no free flight is found, so nothing can be made rigid"
         if self._is_spent:

@@ -273,12 +273,21 @@ class Output:
             self.content(b"")
             return False
         self.notes(judged_card.card.notes, cautions)
-        self.content(encode_text(judged_card.card.text))
+        self.content(encode_text(replace_arguments(judged_card.card.text)))
         # Imported here to keep start-up fast.
         from d2rpick.report.next_step import name_step_after_card
 
         self.next_step(
-            name_step_after_card(judged_card.card, judged_card.worst, question, deck)
+            name_step_after_card(
+                judged_card.card,
+                judged_card.worst,
+                question,
+                deck,
+                is_separate=any(
+                    caution.code == "parts-not-joined"
+                    for caution in judged_card.cautions
+                ),
+            )
         )
         return judged_card.passed
 

@@ -65,8 +65,8 @@ _FEW: Final = 20
 _BAND: Final = 0.045
 # Time shown before and after the flights of a plan, as a fraction of the time that they span [-].
 _BEYOND_FLIGHTS: Final = 0.05
-# The label of a window contains its times if the window has at least this fraction of the simulated time [-].
-_ROOM_FOR_TIMES: Final = 0.2
+# The label of a window contains its times if the window has at least this fraction of the shown time [-].
+_ROOM_FOR_TIMES: Final = 0.15
 
 # Colours of the windows in a plan, keyed by verdict or state.
 _COLOURS: Final = {
@@ -86,7 +86,7 @@ _HATCHES: Final = {
 # _PLAN_HEIGHT: height of the figure of a plan in a file [inch].
 # _PLAN_PANEL: height of the axes in the figure of a plan on a page [inch].
 _PLAN_HEIGHT, _PLAN_PANEL = 4.0, 2.8
-# Height of the strip below the energy in which the windows are drawn, as a fraction of the axes [-].
+# Height of the strip above the energy in which the windows are drawn, as a fraction of the axes [-].
 _STRIP: Final = 0.07
 # Height of the energy axis, as a multiple of the largest energy shown [-].
 _HEADROOM: Final = 1.1
@@ -281,10 +281,9 @@ def _draw_motion(axes: Axes, motion: ReplayedMotion, energy_unit: str) -> None:
 
 
 def draw_plan(plan: RunPlan, *, page: bool = False) -> Figure:
-    """Draw the energy over time on shaded flights, with the rigid windows below the curve."""
+    """Draw the energy over time on shaded flights, with the rigid windows above the curve."""
     figure, (axes,) = figures.begin(1, _PLAN_HEIGHT, page=page)
     history = plan.history
-    span = history.duration
     axes.plot(
         history.time,
         history.energy,
@@ -292,13 +291,15 @@ def draw_plan(plan: RunPlan, *, page: bool = False) -> Figure:
         linewidth=1,
         label="internal energy",
     )
+    _show_flights(axes, plan)
+    first, last = axes.get_xlim()
     for row in plan.flights:
         mark_span(axes, (row.start, row.end), "flight")
         if row.window:
             kind = _name_window_kind(row)
             axes.axvspan(
                 *row.window,
-                ymax=_STRIP,
+                ymin=1 - _STRIP,
                 facecolor=_COLOURS[kind],
                 hatch=_HATCHES[kind],
                 edgecolor="white",
@@ -307,17 +308,18 @@ def draw_plan(plan: RunPlan, *, page: bool = False) -> Figure:
             )
             figures.note(
                 axes,
-                _label_window(row.number, row.window, span),
-                (sum(row.window) / 2, _STRIP),
-                (0, 2),
+                _label_window(row.number, row.window, last - first),
+                (sum(row.window) / 2, 1 - _STRIP),
+                (0, -2),
                 ha="center",
+                va="top",
             )
-    _show_flights(axes, plan)
-    shown = history.between(*axes.get_xlim())[1]
+    axes.set_xlim(first, last)
+    shown = history.between(first, last)[1]
     low = min(0.0, float(shown.min(initial=0.0)))
     high = _HEADROOM * float(shown.max(initial=0.0)) or 1.0
-    axes.set_ylim(low - 2 * _STRIP * (high - low), high)
-    # The axis has no labels below zero energy, because only the windows are drawn there.
+    axes.set_ylim(low, high + 2 * _STRIP * (high - low))
+    # The axis has no labels next to the windows, which have no energy.
     axes.set_yticks([tick for tick in axes.get_yticks() if low <= tick <= high])
     _finish_run_axes(figure, axes, *_label_run_axes(history), page=page)
     return figure

@@ -184,8 +184,13 @@ def name_step_after_card(
     worst: Decision | None,
     question: RepeatedQuestion,
     deck: str | None,
+    *,
+    is_separate: bool,
 ) -> str:
-    """Return the step after a card: the check of the ``deck`` with it, or other times if the ``worst`` pair is poor."""
+    """Return the step after a card: the check of the ``deck`` with it, or other times if the ``worst`` pair is poor.
+
+    ``is_separate``: each part becomes a rigid body of its own, although they may share nodes.
+    """
     if worst is not None and worst.verdict == DO_NOT_USE:
         return f"choose other times with {write_command(question, 'suggest')}"
     if card.has_engine_files:
@@ -195,6 +200,8 @@ def name_step_after_card(
     hint = "" if deck else f" ({name} instead of {_SOME_DECK})"
     files = make_positional([deck or _SOME_DECK])
     line = quote_shell_line(("d2rpick", "check", *question.checking, *files))
+    if is_separate:
+        action = f"if these parts share nodes, print the card again with --merge ID; {action}"
     return f"{action}, then check it with {line}{hint}"
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import isinf
 from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.base.errors import list_names, make_printable
@@ -209,13 +210,12 @@ DOCUMENT: Final = Document(
 
 def as_table(plan: RunPlan, display: DisplayOptions) -> str:
     """Return the plan in one sentence, the next command, a row per flight, and reasons with improvements."""
+    rows = ""
     if plan.flights:
         known_columns = tables.select_known_columns(*build_flight_table(plan))
-        rows = tables.as_text(*known_columns, display.width, _SPARE)
-    else:
-        rows = "no flight"
+        rows = f"\n{tables.as_text(*known_columns, display.width, _SPARE)}\n"
     below = [*list_verdicts(plan), *list_plan_remarks(plan), *list_reasons(plan)]
-    if _OUT_OF_PLACE not in rows.partition("\n")[0]:
+    if _OUT_OF_PLACE not in rows.strip().partition("\n")[0]:
         below += _list_position_errors(plan)
     printable = [(name, make_printable(text)) for name, text in below]
     above = tables.format_in_line([("history", describe_input(plan.history))], 8)
@@ -226,9 +226,7 @@ def as_table(plan: RunPlan, display: DisplayOptions) -> str:
         [
             give_plan_sentence(plan),
             *steps,
-            "",
             rows,
-            "",
             *tables.format_in_line(printable, 9),
             *above,
         ]
@@ -245,10 +243,10 @@ def give_plan_sentence(plan: RunPlan) -> str:
             f"{DO_NOT_USE} any window of this run: it was switched, with rigid parts from {windows}, and no later "
             "flight can be used"
         )
+    if not plan.flights:
+        return f"{DO_NOT_USE} any window of this run: no flight is found in the record"
     if not supported:
-        return "do not use any window of this run now" + "; see below" * bool(
-            plan.flights
-        )
+        return f"{DO_NOT_USE} any window of this run now; see below"
     spans = " and ".join(
         "from {:.6g} to {:.6g}".format(*window) for window in plan.windows
     )
@@ -342,8 +340,12 @@ def _list_step_without_window(
     """Return the next command of a plan without a window that can be used now."""
     rows = [row for row in plan.flights if row.answer and not row.done]
     if not rows:
-        if plan.done or not plan.flights:
+        if plan.done:
             return []
+        if not plan.flights:
+            line = write_command(question, "info")
+            look = f"see with {line} what the run has to write"
+            return [("next", f"{look}, or give the end of the load as --after")]
         line = write_command(question, "explore")
         return [("next", f"compare all td of the longest flight with {line}")]
     answer = max(rows, key=lambda row: row.end - row.start).answer
@@ -496,7 +498,9 @@ _COLUMNS: Final[dict[str, Callable[[PlannedFlight], tables.Cell]]] = {
     "flight": lambda row: row.number,
     "from": lambda row: row.start,
     "to": lambda row: "end of record" if row.flight.end is None else row.flight.end,
-    "margin": lambda row: "-" if row.done else f"{row.margin.time:.3g}",
+    "margin": lambda row: (
+        "-" if row.done or isinf(row.margin.time) else f"{row.margin.time:.3g}"
+    ),
     "tr": lambda row: _get_time(row, 0),
     "td": lambda row: _get_time(row, 1),
     "rigid for": lambda row: row.rigid_time,

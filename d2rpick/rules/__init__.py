@@ -54,6 +54,8 @@ _FOLLOW: Final = {
 }
 # Other rules that report the same field, e.g. a time after the end of the run, by rule.
 _FOLLOW_THERE: Final = {"D2R205": {"D2R101"}}
+# Other rules that report a wrong id of the same part, keyed by rule.
+_FOLLOW_OF_PART: Final = {"D2R103": {"D2R106"}}
 RULES: Final[Mapping[str, Rule]] = {
     rule.id: rule for rule in sorted(_ALL, key=lambda rule: rule.id)
 }
@@ -320,6 +322,7 @@ def _remove_consequences(findings: list[Finding]) -> list[Finding]:
     reported_fields = {
         (finding.rule, finding.file, finding.line) for finding in findings
     }
+    reported_parts = {(finding.rule, _name_part(finding)) for finding in findings}
     return [
         finding
         for finding in findings
@@ -328,7 +331,16 @@ def _remove_consequences(findings: list[Finding]) -> list[Finding]:
             (cause, finding.file, finding.line) in reported_fields
             for cause in _FOLLOW_THERE.get(finding.rule, ())
         )
+        and not any(
+            (cause, _name_part(finding)) in reported_parts
+            for cause in _FOLLOW_OF_PART.get(finding.rule, ())
+        )
     ]
+
+
+def _name_part(finding: Finding) -> str:
+    """Return the part with which the message of a finding begins, such as "part 21"."""
+    return " ".join(finding.message.split()[:2])
 
 
 def _strip_windows(case: Case) -> Iterator[CheckedWindow]:

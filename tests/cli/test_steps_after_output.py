@@ -224,3 +224,49 @@ def test_the_error_of_a_table_has_the_name_of_the_first_line() -> None:
     assert "level shortfall 0." in levels
     study = run("study", "--td", "0.064", "--", ENERGY, ENERGY).stdout
     assert "residual at common tr" in study
+
+
+@pytest.mark.parametrize("td", ["0.36", "0.355"])
+def test_a_better_pair_is_named_alike_even_if_its_residual_is_large(td: str) -> None:
+    """At this td most of the vibration energy is kinetic; the pair at the next peak is wrong by 60% only."""
+    question = ("--part", "flying", MATSUM)
+    suggested = run_json("suggest", "--td", td, *question)
+    times = ("--tr", repr(suggested["recommended"]["tr"]), "--td", td)
+    judged = run_json("verify", *times, *question)
+    explored = run("explore", "--td", td, *question).stdout
+    (studied,) = run_json("study", "--td", td, *question)["runs"]
+    cure = suggested["cure"]
+    assert cure.startswith("use tr = ")
+    assert cure.endswith(": vibration wrong by 60%")
+    assert judged["cure"] == cure
+    assert studied["cure"] == cure
+    assert f"to improve {cure}" in join_wrapped_lines(explored)
+
+
+def test_a_plan_without_a_flight_says_so_first(tmp_path: Path) -> None:
+    table = tmp_path / "rise.csv"
+    rows = "".join(f"{i / 1000},{i * i / 1e3}\n" for i in range(200))
+    table.write_text(f"time,internal_energy\n{rows}")
+    text = run("plan", str(table)).stdout
+    assert text.startswith(
+        "do not use any window of this run: no flight is found in the record\nnext "
+    )
+    assert f"see with d2rpick info {table} what" in join_wrapped_lines(text)
+
+
+def test_a_record_of_one_state_is_too_short_for_a_flight(tmp_path: Path) -> None:
+    table = tmp_path / "short.csv"
+    table.write_text("time,internal_energy,kinetic_energy\n0,1,2\n")
+    text = join_wrapped_lines(run("info", str(table)).stdout)
+    assert "why the files contain 1 state, at least 3 were expected" in text
+
+
+def test_a_card_of_parts_that_may_share_nodes_says_how_to_merge_them() -> None:
+    history = ("--history", str(SAMPLES / "rollover_box.glstat"))
+    times = ("--tr", "0.123689", "--td", "0.37", "--part", "1,2")
+    apart = run("card", *times, *history).stderr
+    merged = run("card", *times, "--merge", "1", *history).stderr
+    assert (
+        "next: if these parts share nodes, print the card again with --merge" in apart
+    )
+    assert "next: add these cards to the main deck" in merged

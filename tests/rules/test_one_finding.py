@@ -88,3 +88,15 @@ def test_only_what_is_nearly_a_rule_is_suggested() -> None:
         with pytest.raises(ConfigurationError) as refused:
             find_rules(name)
         assert "did you mean" not in str(refused.value)
+
+
+def test_a_wrong_part_id_is_one_finding_for_both_switches(tmp_path: Path) -> None:
+    cards = write_automatic_card(1, "0.01", rigid=["77"]) + write_automatic_card(
+        2, "0.06", deformable=["77"]
+    )
+    lone = write_automatic_card(3, "0.07", deformable=["1"])
+    deck = write(tmp_path, HEAD + PARTS + cards + lone + "*END\n")
+    findings = run_json("check", "--ignore", "D2R111", deck)["findings"]
+    assert {finding["rule"] for finding in findings} == {"D2R106", "D2R103"}
+    (back,) = (finding for finding in findings if finding["rule"] == "D2R103")
+    assert back["message"].startswith("part 1 ")

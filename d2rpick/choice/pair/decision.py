@@ -198,6 +198,13 @@ class Decision(NamedTuple):
         """The change that would make the pair better; empty if the pair is already good."""
         if self.grade == GOOD:
             return ""
+        if self.needs_better_record:
+            # A better pair of the same record cannot be used either.
+            return join_cures(
+                cause.cure
+                for cause in self.quality.causes
+                if not cause.needs_other_times
+            )
         if self.better is not None:
             return f"use {_describe_pair(self.better)}"
         if self.is_outside_flight and not self.is_compared:

@@ -527,6 +527,9 @@ def _describe_wrong_tr(
         reason += f": the energy at tr is {ratio:.3g} times that at td"
     elif candidate.sign_match is False:
         reason += ": the deformation has the opposite direction"
+    elif best_residual > POOR_RESIDUAL:
+        # Every tr is poor, and nothing but the error itself speaks against this one.
+        return None
     best = f"the best tr at this td is wrong by {format_residual(best_residual)}"
     return Cause(
         f"{reason}; {best}",

@@ -331,6 +331,11 @@ def _explain_grade(decision: Decision, pair: Pair) -> str:
 
 def _explain_short_window(rigid: float, shortest: float, margin: Margin) -> str:
     """Explain that a window is too short."""
+    if np.isinf(margin.time):
+        return (
+            "too short: a switch may shift the landing by more than the duration of the flight, so no margin before "
+            "the contact is long enough; a given margin (`margin`) is used as it is"
+        )
     if margin.time:
         margin_text = f", with the margin {margin.time:.3g} before the contact"
     else:
