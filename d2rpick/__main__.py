@@ -5,7 +5,7 @@ import os
 import signal
 import sys
 
-_SOON = 0.01  # time until an interrupt that was swallowed is repeated [s]
+_SOON = 0.05  # time until an interrupt that was swallowed is repeated [s]
 _PATIENCE = 2.0  # longest wait for other threads at the end of an interrupted run [s]
 
 
@@ -33,10 +33,10 @@ def main() -> None:
     def interrupt_again(ignored: "sys.UnraisableHookArgs") -> None:
         """Repeat an interrupt that is swallowed while an object is deleted; print no traceback of it."""
         if ignored.exc_type is KeyboardInterrupt:
-            from threading import Timer
+            from _thread import start_new_thread
 
-            # Raised here, it would be swallowed again.
-            Timer(_SOON, os.kill, (os.getpid(), signal.SIGINT)).start()
+            # Raised here, it would be swallowed again. A Thread or Timer is not used, because its start waits for it.
+            start_new_thread(_interrupt_soon, ())
 
     # A background job has another handler, because it ignores interrupts.
     is_interruptible = signal.getsignal(signal.SIGINT) is signal.default_int_handler
@@ -64,8 +64,16 @@ def main() -> None:
             raise KeyboardInterrupt
 
 
+def _interrupt_soon() -> None:
+    """Send the interrupt to this process again after a while."""
+    import time
+
+    time.sleep(_SOON)
+    os.kill(os.getpid(), signal.SIGINT)
+
+
 def _limit_waiting() -> None:
-    """End this process by SIGINT after a while, even if one of its threads does not end.
+    """End this process by SIGINT after some time, even if one of its threads does not end.
 
     Python waits for the threads of a process pool before it ends. The processes of the pool have been interrupted too,
     at any point of their work.

@@ -75,7 +75,7 @@ def card(
         history = judged_card.verdicts[0].situation.history
         output.notes(history.notes, ())
         if not history.parts:
-            # The parts are those of the card alone.
+            # Only the parts of the card are used.
             question = question._replace(parts=())
     output.card(judged_card, collect_cautions(judged_card), question, request.deck)
     if judged_card.worst:

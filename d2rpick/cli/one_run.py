@@ -240,7 +240,7 @@ def explore(
 ) -> None:
     """Show for each time td to switch back the best tr, the error, and the saving.
 
-    d2rpick compares evenly spaced values of td, and every peak of the energy, in --td-window or in the longest flight.
+    In --td-window, or in the longest flight, d2rpick compares evenly spaced values of td, and every peak of the energy.
     It judges each td as `suggest --td` does.  The table lists the pairs that no other pair beats in both error and
     rigid time.  d2rpick also names the nearest td with half the error.
 

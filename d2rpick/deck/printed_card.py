@@ -116,7 +116,7 @@ class PrintedCard:
 
     @property
     def has_engine_files(self) -> bool:
-        """True if the input consists of Radioss engine files, and is not included by a deck."""
+        """True if the input consists of Radioss engine files, which no deck includes."""
         return any(name.endswith(".rad") for name in self.files)
 
 

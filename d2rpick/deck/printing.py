@@ -231,7 +231,7 @@ def _check_printed(texts: Sequence[str]) -> None:
 
 
 def _note_roundings(times: Times, texts: tuple[str, str]) -> Iterator[str]:
-    """Yield a note for each time that a card cannot represent with the six digits that all answers show."""
+    """Yield a note for each time that a card cannot represent with the six digits shown in all answers."""
     for name, value, text in zip(("tr", "td"), times, texts, strict=True):
         if f"{float(text):.6g}" != f"{value:.6g}":
             yield f"{name} = {value:.6g} is rounded to {text}, the nearest number in {LONGEST} characters."
@@ -262,7 +262,7 @@ def _write_warnings(ids: Sequence[int], printing: Printing) -> Iterator[str]:
 
 
 def _explain_step_limit(printing: Printing) -> str:
-    """Return where the time-step limit of the cards comes from, and why they have one."""
+    """Return the origin of the time-step limit on the cards, and the reason for it."""
     if printing.step_cap is None:
         source = f"1/{CAP_SHARE} of the rigid time (--step-cap sets another limit)"
     else:

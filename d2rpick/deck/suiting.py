@@ -85,7 +85,7 @@ def _find_free_ids(deck: Deck) -> tuple[int, int]:
 
 
 def _read_deleted(deck: Deck, flag: str) -> list[Constraint]:
-    """Return the constraints that a flag deletes; for joints and extra nodes, which either may delete, NCSF is used."""
+    """Return the constraints that a flag deletes. If either flag may delete a kind, the kind belongs to NCSF."""
     kinds = (kind for kind, flags in DELETING_FLAGS.items() if flags[-1] == flag)
     return [*read_constraints(deck, *kinds)]
 

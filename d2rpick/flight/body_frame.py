@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.base.tuples import NamedTuple
+from d2rpick.flight.window import LAST_DIGIT
 
 if TYPE_CHECKING:
     from d2rpick.deck.geometry import Placement
@@ -24,8 +25,6 @@ _MOST_BENT: Final = 0.05
 _MOST: Final = 0.5
 # Points are treated as collinear if their smallest moment of inertia is at most this fraction of the others [-].
 _ALONG_LINE: Final = 1e-9
-# Relative error of a time written in single precision [-].
-_ROUNDED_TIME: Final = 1e-6
 # Number of nodes that define the frame of a body; they are spread over the body, and more would hardly improve it.
 _MOST_NODES: Final = 50
 
@@ -90,7 +89,7 @@ def find_frame_of_nodes(
 
 def _is_within(wanted: Samples, written: Samples) -> bool:
     """Return True if times (n,) lie within the span of the written times (k,), apart from rounding."""
-    room = _ROUNDED_TIME * float(np.abs(wanted).max())
+    room = LAST_DIGIT * float(np.abs(wanted).max())
     return bool(written[0] <= wanted[0] + room and written[-1] >= wanted[-1] - room)
 
 

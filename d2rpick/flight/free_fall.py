@@ -14,6 +14,7 @@ from d2rpick.base.caching import cached_property
 from d2rpick.flight.window import (
     FEWEST,
     FEWEST_STATES_OF_WORK,
+    LAST_DIGIT,
     ROUND_OFF,
     TOLERANCE,
     Constant,
@@ -64,8 +65,6 @@ _STRAIGHT = 0.01
 _UNSEEN = 2.0
 # Relative error of the work of gravity computed from the states [-].
 _OF_WORK = 2e-3
-# A mass that exceeds the lower bound from momenta and energies by this fraction must come from the solver [-].
-_CLEARLY_HEAVIER = 1e-6
 
 
 class Laws:
@@ -301,8 +300,9 @@ class Laws:
             squares, 2 * kinetic, out=np.zeros_like(squares), where=kinetic > 0
         )
         best = int(np.argmax(ratios))
-        if self.mass > (1 + _CLEARLY_HEAVIER) * ratios[best]:
-            return False  # The mass is exact, because the solver wrote it.
+        if self.mass > (1 + LAST_DIGIT) * ratios[best]:
+            # The mass exceeds its lower bound by more than rounding, so the solver wrote it.
+            return False
         swing = float(np.ptp(balance.internal[find_window(balance.time, start, end)]))
         largest = force / self.mass
         lightest = largest * (1 - swing / float(kinetic[best]))
@@ -460,7 +460,7 @@ class FreeFall(Law):
         return self._fitted(first, last)[2]
 
     def limit_damping(self, first: int, last: int) -> float:
-        """Return the largest alpha between two states that is damping [1/time]; a load slows the parts down more."""
+        """Return the largest damping rate alpha between two states [1/time] that is not attributed to a load."""
         length = float(self.time[last] - self.time[first])
         return max(_DAMPED, _SHOWN * (last - first)) / length
 

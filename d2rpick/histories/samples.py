@@ -28,7 +28,7 @@ _TOGETHER: Final = 8
 _STILL: Final = 8 * float(np.finfo(np.float64).eps)
 # Number of halvings of a bracket that are tested together if there are few brackets.
 _HALVED_TOGETHER: Final = 5
-_FEW: Final = 100  # Largest number of brackets that count as few.
+_FEW: Final = 100  # Largest number of brackets that are treated as few.
 HALVINGS: Final = 50  # Number of bisections that narrow a bracket to rounding error
 
 

@@ -35,7 +35,7 @@ DOCUMENT: Final = Document("d2rpick/calibrate/1", "Answer of d2rpick calibrate; 
 HEAD = ("formulation", "weight [us]", "built-in [us]", "source")
 COLUMNS = ("formulation", "weight", "measured", "told")
 LEG_HEAD = ("run", "CPU time of a step", "of the elements", "rigid nodes")
-# Largest misfit of weights that need no caution [-]: twice the error that the fit assumes for CPU times.
+# Weights with a misfit up to this need no caution [-]; it is twice the CPU-time error that the fit assumes.
 _SMALL_MISFIT: Final = 0.1
 # Names of formulations that the solvers do not have.
 _IN_WORDS: Final = {POINT: "integration point"}

@@ -25,7 +25,7 @@ def list_verdict_lines(decision: Decision, tr: float, td: float) -> Lines:
     ]
     if decision.cure:
         lines.append(("to improve", decision.cure))
-    # Once a switched run was compared, the screen also shows the measured values.
+    # If a switched run was compared, the screen also shows the measured values.
     name = "predicted" if decision.is_compared else "expect"
     return [*lines, (name, describe_expectation(decision))]
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from d2rpick.running.inner_motion import Wait
     from d2rpick.running.witness import SeenFlight
 
-# Messages of events that are always the same.
+# Messages of events that never vary.
 _MESSAGES: Final = {
     "load": "a force acts",
     "rigid": "parts have become rigid: part data are not used until they deform again",

@@ -89,7 +89,7 @@ DOCUMENT: Final = Document("d2rpick/info/1", "Answer of d2rpick info; times in t
 # Largest number of contact times that are listed if a contact acts often.
 _MOST_TIMES: Final = 4
 _PARTS_HEAD = ("part", "title", "highest internal energy")
-# What to do with the record; the verdict of a pair has the same words, so the sentence names the record.
+# What to do with the record. The verdict on a pair uses the same words, so the sentence names the record.
 _RECORD: Final = {
     USE: "use it to choose times",
     USE_WITH_CARE: "use it with care to choose times",

@@ -92,7 +92,7 @@ class Watch:
         self._names = names
         self.looks = Looks(selection, inventory, wait)
         self._files: dict[str, FileStamp] = {}
-        self._events: tuple[RunEvent, ...] = ()  # All events so far.
+        self._events: tuple[RunEvent, ...] = ()  # All events that have been found.
         self._news = News()
         self._report_silence_after = _SILENT
 

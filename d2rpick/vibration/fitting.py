@@ -58,6 +58,7 @@ _FAR_TOO_MUCH: Final = 1.2
 STARTS: Final = 3
 # No second starting value is tried if the first one leaves less than this fraction of the variance unexplained [-].
 CERTAIN: Final = 0.01
+# Largest number of steps of a refinement.
 _MAX_STEPS: Final = 40
 # Smallest phase angle that a vibration passes through in the record [rad], i.e. 1/10 period; less is a drift.
 # In a test with 1,100 slow drifts, no refined fit to all samples showed a vibration.

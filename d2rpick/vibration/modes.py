@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 BLOCK: Final = 8192
 # Largest number of steps of the root search; it suffices for bisection alone to reach full precision.
 _STEPS = 64
+# Relative rounding error of a double [-].
 _EPS = float(np.finfo(np.float64).eps)
 # Largest energy that may be a solver error, as a fraction of the highest energy [-]; typical errors are 1/10 of it.
 SOLVER_FLOOR: Final = 1e-4

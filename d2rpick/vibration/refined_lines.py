@@ -1,8 +1,8 @@
-"""Refine spectral lines in noise by least squares, and add the lines that the subspace of the whole record misses.
+"""Refine spectral lines in noise by least squares: add those that are missing, and remove those of the noise.
 
 The poles of shift invariance (`lines`) are not those of the smallest misfit.  A line that dies early is weak in the
 whole record, so noise may take its place in the subspace, although the first part of the record shows it; and a line
-that stands out of the misfit is none of noise.  Such lines are added if the misfit falls by more than chance allows.
+that stands out of the misfit is none of noise.  A line counts if the misfit is smaller with it than by chance alone.
 """
 
 from __future__ import annotations
@@ -38,10 +38,10 @@ _MOST_INFLATED: Final = 1.1
 _DAMPING: Final = 1e-9
 # Largest number of parameters per state of the grid [-].
 _MOST_PARAMETERS: Final = 0.5
-# A further line has this number of parameters: two for its weight and two for its pole.
+# A line has this number of parameters: two for its weight and two for its pole.
 _OF_A_LINE: Final = 4
-# A further line must raise twice the logarithm of the likelihood by this more than the Bayesian information
-# criterion demands (Schwarz, Annals of Statistics 6, 1978) [-]; it is chosen from as many lines as there are states.
+# A line must raise twice the logarithm of the likelihood by what the Bayesian information criterion demands (Schwarz,
+# Annals of Statistics 6, 1978).  An added line must raise it by this more, since it is chosen from many lines [-].
 _BEYOND_CHOICE: Final = 6.0
 # Lines of the first part are missing if no line of the record has a frequency within this [cycles over the record].
 _SAME_LINE: Final = 0.5
@@ -77,6 +77,7 @@ def refine_prediction(grid: Grid, prediction: Prediction) -> Prediction:
         if extended is None:
             break
         spectrum = extended
+    spectrum = _remove_needless_lines(grid, spectrum)
     # Least squares gives the best lines only if the misfit is noise; lines may also be fitted to the end of a load.
     is_noise = measure_structure(spectrum.rest) == 0
     return prediction._replace(spectrum=spectrum) if is_noise else prediction
@@ -154,14 +155,27 @@ def _add_line(grid: Grid, spectrum: Spectrum, pole: complex) -> Spectrum | None:
     if not are_lines(poles, grid.span).all():
         return None
     extended = _refine_spectrum(grid, fit_weights(grid, poles, spectrum.mean.poles))
-    is_needed = _compute_gain(spectrum, extended) > _get_needed_gain(grid)
+    needed = _get_needed_gain(grid) + _BEYOND_CHOICE
+    is_needed = _compute_gain(spectrum, extended) > needed
     is_lasting = -extended.lines.poles[-1].real * grid.span < _MOST_DECAY
     return extended if is_needed and is_lasting else None
 
 
+def _remove_needless_lines(grid: Grid, spectrum: Spectrum) -> Spectrum:
+    """Return the spectrum without the lines that reduce the misfit by no more than chance; one line is kept."""
+    for rank in range(spectrum.lines.poles.size - 1, 0, -1):
+        strongest_first = np.argsort(-np.abs(spectrum.lines.weights))
+        is_kept = np.arange(strongest_first.size) != strongest_first[rank]
+        poles = spectrum.lines.poles[is_kept]
+        simpler = _refine_spectrum(grid, fit_weights(grid, poles, spectrum.mean.poles))
+        if _compute_gain(simpler, spectrum) <= _get_needed_gain(grid):
+            spectrum = simpler
+    return spectrum
+
+
 def _get_needed_gain(grid: Grid) -> float:
-    """Return by how much a further line must raise twice the logarithm of the likelihood [-]."""
-    return float(_OF_A_LINE * np.log(grid.time.size)) + _BEYOND_CHOICE
+    """Return by how much a line must raise twice the logarithm of the likelihood, unless it is added [-]."""
+    return float(_OF_A_LINE * np.log(grid.time.size))
 
 
 def _compute_gain(spectrum: Spectrum, better: Spectrum) -> float:

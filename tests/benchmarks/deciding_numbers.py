@@ -45,6 +45,7 @@ from tests.benchmarks.deciding_constants import (
     scale_constant,
 )
 from tests.benchmarks.deciding_questions import Answer, Question, make_questions
+from tests.benchmarks.deciding_reasons import REASONS
 
 FACTORS: Final = {"halved": 0.5, "doubled": 2.0}
 # After this number of changed answers, a constant is known to decide, and no further questions are asked.
@@ -64,6 +65,7 @@ _HEAD: Final = (
     "first changes",
     "what it decides",
     "source or reason",
+    "why it is kept although no answer changed",
 )
 
 
@@ -298,7 +300,8 @@ def write_table(
         row = rows.get(name, Row(name, f"{constant.value}", "", "", ""))
         rank = 2 if not row.halved else int(not row.decides)
         meaning, *sources = _FIRST_SENTENCE.split(constant.comment, maxsplit=1)
-        lines.append((rank, [*row, meaning, *(sources or [""])]))
+        kept = "" if row.decides else REASONS.get(name, "")
+        lines.append((rank, [*row, meaning, *(sources or [""]), kept]))
     lines.sort(key=lambda line: line[0])
     with path.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")

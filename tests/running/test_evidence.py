@@ -16,6 +16,7 @@ from d2rpick.choice.td.flights import find_flights
 from d2rpick.histories.history import EXACT, Given, History, Momenta, select_states
 from d2rpick.histories.names import Part
 from d2rpick.histories.opening import Selection, open_run
+from d2rpick.histories.surroundings import Surroundings
 from d2rpick.running.events import find_events, highest_energy
 from d2rpick.running.evidence import GrowingEvidence
 from d2rpick.running.inner_motion import Wait
@@ -246,6 +247,16 @@ def test_a_body_without_gravity_flies_again_after_each_push(
         assert flight.start + wait <= flight.seen <= start + latest + 2 * wait
         assert flight.end == (end and pytest.approx(end, abs=5e-3))
         assert flight.gravity == 0.0
+
+
+def test_a_constant_momentum_is_no_flight_if_the_deck_has_gravity() -> None:
+    """Something carries the body, for example a floor without friction."""
+    history = make_body_without_gravity(0.0, 0.0)
+    (momenta,) = history.momenta
+    surroundings = Surroundings(gravity={None: (9.81,)})
+    carried = replace(momenta, surroundings=surroundings)
+    history = make_table(history.time, history.energy, carried)
+    assert take_whole_record(history, 0.03).flights() == ()
 
 
 @pytest.mark.parametrize("friction", [2.0, 20.0])

@@ -68,20 +68,24 @@ def test_the_rates_come_nearer_to_those_of_the_structure() -> None:
         grid, prediction = predict_record(energy)
         before.append(measure_rate_errors(prediction, structure))
         refined = refine_prediction(grid, prediction)
-        assert refined.spectrum.error <= prediction.spectrum.error
         after.append(measure_rate_errors(refined, structure))
     assert np.median(np.square(after)) < 0.8 * np.median(np.square(before))
 
 
-def test_noise_alone_adds_no_line() -> None:
+def test_lines_of_noise_alone_are_neither_added_nor_kept() -> None:
     structure = LinearStructure.draw(3, 2)
     energy = structure.elastic_energy(TIME)
     random = np.random.default_rng(11)
+    counts, refined_counts = [], []
     for _ in range(20):
         normal = random.standard_normal(TIME.size)
         grid, prediction = predict_record(energy + NOISE * np.ptp(energy) * normal)
-        count = prediction.spectrum.lines.poles.size
-        assert refine_prediction(grid, prediction).spectrum.lines.poles.size == count
+        refined = refine_prediction(grid, prediction)
+        counts.append(prediction.spectrum.lines.poles.size)
+        refined_counts.append(refined.spectrum.lines.poles.size)
+        assert measure_rate_errors(refined, structure).max() < 0.05
+    assert max(counts) > 2
+    assert max(refined_counts) == 2
 
 
 @pytest.mark.parametrize("noise", [0.0, 1e-4])

@@ -15,7 +15,7 @@ USE_WITH_CARE: Final = "use with care"
 DO_NOT_USE: Final = "do not use"
 VERDICTS: Final = {POOR: DO_NOT_USE, FAIR: USE_WITH_CARE, GOOD: USE}
 
-# From this residual on, a tenth of a per cent is noise in a sentence [-].
+# From this residual on, sentences do not give tenths of a per cent [-].
 _COARSE: Final = 0.1
 # Smallest accepted mean energy after td, relative to the reference run; well-switched computed runs had at least 0.77.
 MIN_MEAN_ENERGY: Final = 0.7

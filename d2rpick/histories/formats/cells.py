@@ -120,7 +120,7 @@ def has_number(cell: str, decimal: str, thousands: str = "") -> bool:
 def split_columns_of_numbers(
     lines: Sequence[str], separator: str | None, decimal: str, columns: int
 ) -> list[list[str]] | None:
-    """Return the cells of each column if all lines have ``columns`` plain numbers, otherwise None; for many lines.
+    """Return the cells of each column if all lines consist of ``columns`` plain numbers; otherwise None.
 
     Examples
     --------

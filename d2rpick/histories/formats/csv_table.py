@@ -94,7 +94,7 @@ def find_numeric_columns(sample: Sequence[Sequence[str]]) -> frozenset[int]:
 
 
 def _split_columns(lines: Sequence[str], layout: Layout) -> list[list[str]]:
-    """Return the cells of each column, from the lines that are rows of the table."""
+    """Return the cells of each column in those lines that are rows of the table."""
     rows = [
         split_cells(line, layout.separator) for line in lines if not is_skipped(line)
     ]

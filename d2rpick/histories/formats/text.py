@@ -283,7 +283,7 @@ def _count_at_most(field: str) -> int:
     """Return an upper limit of the number of significant digits of a field, which costs less than the number."""
     written = field.lstrip("+-0.")
     if not written[:1].isdigit():
-        written = field  # The zeros of 0.00000E+00 count.
+        written = field  # The zeros of 0.00000E+00 are treated as significant digits.
     return len(written) - ("." in written)
 
 
