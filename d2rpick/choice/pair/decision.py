@@ -200,8 +200,11 @@ class Decision(NamedTuple):
             return ""
         if self.needs_better_record:
             # A better pair of the same record cannot be used either.
-            causes = [cause for cause in self.quality.causes if cause.is_of_record]
-            return join_cures(cause.cure for cause in causes)
+            return join_cures(
+                cause.cure
+                for cause in self.quality.causes
+                if not cause.needs_other_times
+            )
         if self.better is not None:
             return f"use {_describe_pair(self.better)}"
         if self.is_outside_flight and not self.is_compared:
