@@ -145,7 +145,10 @@ def read_page_of(
         command, *args, "-q", "--report", str(folder / "report.html"), stdin=stdin
     )
     assert result.exit_code == code, result.stderr
-    reason = "d2rpick: exit code 1: the verdict is " if code else None
+    reasons = ("the verdict is ", "the comparison with the switched run failed")
+    reason = (
+        tuple(f"d2rpick: exit code 1: {text}" for text in reasons) if code else None
+    )
     assert not [
         line
         for line in result.stderr.splitlines()
