@@ -20,8 +20,9 @@ ASSUMED_PARTS: Final = (
 
 
 def rests_on_assumed_parts(history: History) -> bool:
-    """Return True if nothing shows of which parts the energy is, because the file is a table."""
-    return history.parts is None and not READERS[history.energy_format].solver
+    """Return True if nothing shows of which parts the energy is, because it is from a table or from no file."""
+    is_of_solver = history.energy_format != "" and READERS[history.energy_format].solver
+    return history.parts is None and not is_of_solver
 
 
 class PartsTogether:
