@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from d2rpick.choice.answers import verify_run
 from d2rpick.choice.pair.grades import DO_NOT_USE
+from d2rpick.choice.pair.together import ASSUMED_PARTS
 from d2rpick.deck.printing import DEFAULT, SOLVERS, find_solver, print_cards
 from d2rpick.histories.formats import READERS
 
@@ -138,14 +139,10 @@ def _list_card_remarks(
     if done:
         windows = ", ".join(f"{tr:.6g} to {td:.6g}" for tr, td in done)
         yield f"{', '.join(history.source)} was rigid from {windows}: these windows are done and not judged again."
-    if history.parts is None and history.channel.replace(" ", "_") == "internal_energy":
-        if READERS[history.energy_format].solver:
-            yield "The internal energy is that of the whole model, not of the switched parts alone."
-        else:
-            yield (
-                "The table does not name the parts of the internal energy: it must be that of the switched parts, "
-                "and of all parts that vibrate with them."
-            )
+    if _names_no_part(history) and READERS[history.energy_format].solver:
+        yield "The internal energy is that of the whole model, not of the switched parts alone."
+    elif _names_no_part(history):
+        yield f"The table does not name the parts of the internal energy: it must be {ASSUMED_PARTS}."
     for verdict in verdicts:
         if len(verdicts) > 1:
             which = f" {verdict.candidate.tr:.6g} to {verdict.situation.td:.6g}"
@@ -156,6 +153,12 @@ def _list_card_remarks(
     yield from dict.fromkeys(
         f"{caution.code}: {caution.message}." for caution in cautions
     )
+
+
+def _names_no_part(history: History) -> bool:
+    """Return True if the energy is named like that of a whole model, and no file names its parts."""
+    is_of_model = history.channel.replace(" ", "_") == "internal_energy"
+    return history.parts is None and is_of_model
 
 
 def _describe_verdict(verdict: PairVerdict, which: str) -> Iterator[str]:

@@ -12,6 +12,7 @@ import math
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Final, NamedTuple
 
+from d2rpick.base.errors import DeckError
 from d2rpick.base.graph import find_reachable
 from d2rpick.deck.radioss_columns import DELAY, FORCE_SENSOR, SENSOR_INPUTS, STOP
 from d2rpick.deck.radioss_deck import (
@@ -200,6 +201,16 @@ def list_forces(starter: Starter) -> list[tuple[str, int]]:
     ]
     walls = [("RWALL", get_number(card, -1)) for card in starter.named("RWALL")]
     return contacts + walls
+
+
+def require_forces(path: str, starter: Starter) -> list[tuple[str, int]]:
+    """Return the contacts and walls as `list_forces` does; raise DeckError if there are none."""
+    forces = list_forces(starter)
+    if not forces:
+        raise DeckError(
+            f"{path}: the deck has no contact and no rigid wall, so nothing would end a flight"
+        )
+    return forces
 
 
 def join_spans(several: Sequence[Spans]) -> Spans:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from d2rpick.base.errors import list_names, make_printable
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.choice import health as limits
+from d2rpick.choice.pair.together import ASSUMED_PARTS, rests_on_assumed_parts
 from d2rpick.flight.flight import MOST_WORK
 from d2rpick.report.tables import format_measure
 
@@ -82,6 +83,9 @@ def list_situation_heading(
         ),
         ("basis", f"{_describe_basis(situation)}{f': {why}' if why else ''}"),
     ]
+    if rests_on_assumed_parts(situation.history):
+        assumed = f"the energy is {ASSUMED_PARTS}; the table does not name its parts"
+        lines.insert(1, ("assumes", assumed))
     if flight.start is None:
         lines.append(("flight", "unknown"))
     else:

@@ -12,5 +12,6 @@
    the findings of all engine runs before, and `engine` starts it.
 
 `swing` warns of parts that oscillate too strongly to become rigid.  `checks` refuses decks before anything is computed.
-`first` needs no states: it writes decks in which the solver itself detects flights.
+`first` needs no states: it chooses the parts and the wait of a deck in which the solver itself detects flights by
+contact forces (`deck.first_run_cards`).
 """

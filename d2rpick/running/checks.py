@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 from d2rpick.base.errors import DeckError, RangeError, name_units
 from d2rpick.deck.pieces import find_supports
 from d2rpick.deck.radioss_run import read_run
-from d2rpick.deck.radioss_sensors import list_forces
+from d2rpick.deck.radioss_sensors import require_forces
 from d2rpick.flight.window import FEWEST
 
 if TYPE_CHECKING:
@@ -16,11 +16,6 @@ if TYPE_CHECKING:
     from d2rpick.deck.model import Inventory
     from d2rpick.deck.radioss_deck import Starter
     from d2rpick.running.sequence import Limits
-
-
-NO_CONTACT: Final = (
-    "the deck has no contact and no rigid wall, so nothing would end a flight"
-)
 
 
 def refuse_held(path: str, inventory: Inventory, parts: Collection[int]) -> None:
@@ -54,8 +49,8 @@ def check_driven(
     """
     refuse_held(path, inventory, parts)
     starter = read_run(path).starter
-    if starter is None or not list_forces(starter):
-        raise DeckError(f"{path}: {NO_CONTACT}")
+    assert starter is not None  # A run without a starter deck cannot be driven.
+    require_forces(path, starter)
     _check_history(path, starter, {*parts} - inventory.springs)
     shortest, longest = FEWEST * limits.interval, limits.end / 2
     if wait is not None and not shortest <= wait < longest:

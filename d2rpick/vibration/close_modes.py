@@ -161,13 +161,17 @@ def _differentiate_heights(lines: Exponentials, times: Samples) -> Samples:
 
 
 def _move_lines(grid: Grid, lines: Exponentials, step: Samples) -> Spectrum:
-    """Return the spectrum of the lines after a step of their parameters, shape (4 k,)."""
+    """Return the spectrum of the lines after a step of their parameters, shape (4 k,).
+
+    Lines do not grow by more than the growth that is allowed to lines of modes, because a longer step could overflow.
+    """
     of_weights, of_poles = step.reshape(2, 2, -1)
+    growth = np.minimum(lines.poles.real + of_poles[0], MOST_GROWTH / grid.span)
     return _fill_mean(
         grid,
         lines._replace(
             weights=lines.weights + of_weights[0] + 1j * of_weights[1],
-            poles=lines.poles + of_poles[0] + 1j * of_poles[1],
+            poles=growth + 1j * (lines.poles.imag + of_poles[1]),
         ),
     )
 
@@ -175,6 +179,5 @@ def _move_lines(grid: Grid, lines: Exponentials, step: Samples) -> Spectrum:
 def _fill_mean(grid: Grid, lines: Exponentials) -> Spectrum:
     """Return the spectrum of lines whose heights add up to the mean energy."""
     spectrum = Spectrum(lines, _sum_heights(lines), np.zeros(grid.time.size))
-    with np.errstate(over="ignore", invalid="ignore"):  # Too large a step is rejected.
-        rest = grid.energy - spectrum.average_blocks(grid).at(grid.time)
+    rest = grid.energy - spectrum.average_blocks(grid).at(grid.time)
     return spectrum._replace(rest=rest)

@@ -1,4 +1,4 @@
-"""Commands whose result is a file, a deck or a set of weights name the next command, and it can be typed."""
+"""Commands whose result is a file, a deck or weights name the next command; each screen says what it rests on."""
 
 import re
 import shlex
@@ -270,3 +270,11 @@ def test_a_card_of_parts_that_may_share_nodes_says_how_to_merge_them() -> None:
         "next: if these parts share nodes, print the card again with --merge" in apart
     )
     assert "next: add these cards to the main deck" in merged
+
+
+def test_a_table_says_which_parts_its_energy_must_contain() -> None:
+    table = str(SAMPLES / "rollover_box.csv")
+    of_table = join_wrapped_lines(run("suggest", table).stdout)
+    of_parts = run("suggest", "--part", "box", MATSUM).stdout
+    assert "all parts that vibrate with them; the table does not name" in of_table
+    assert "assumes" not in of_parts

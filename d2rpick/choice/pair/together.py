@@ -2,14 +2,27 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.caching import cached_property
+from d2rpick.histories.formats import READERS
 
 if TYPE_CHECKING:
     from d2rpick.flight.flight import Flight
     from d2rpick.flight.vibrating import Beside
     from d2rpick.histories.history import History, Samples
+
+
+# Parts that the energy of a table must contain, because the verdict on a pair assumes it.
+ASSUMED_PARTS: Final = (
+    "that of the switched parts, and of all parts that vibrate with them"
+)
+
+
+def rests_on_assumed_parts(history: History) -> bool:
+    """Return True if nothing shows of which parts the energy is, because it is from a table or from no file."""
+    is_of_solver = history.energy_format != "" and READERS[history.energy_format].solver
+    return history.parts is None and not is_of_solver
 
 
 class PartsTogether:

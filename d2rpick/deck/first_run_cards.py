@@ -1,0 +1,253 @@
+"""Print the cards of a first run that switches its parts by contact forces, by which the solver detects flights.
+
+Radioss: legs that sensors end by /STOP/LSENSOR (tried with a solver; docs/reference/first-run.md).  LS-DYNA: a pair of
+switch sets with CODE 2 (no contact force) and 4 (contact force), from published text.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+from d2rpick.base.errors import DeckError
+from d2rpick.deck.engine_files import EngineFile, write_engine_lines
+from d2rpick.deck.ls_dyna_parts import read_entities
+from d2rpick.deck.printed_card import (
+    PHYSICS,
+    PrintedCard,
+    Printing,
+    check_ids,
+    write_comments,
+    write_number,
+)
+from d2rpick.deck.radioss_bodies import find_bodies
+from d2rpick.deck.radioss_deck import find_bodies_kept_off
+from d2rpick.deck.radioss_run import read_run
+from d2rpick.deck.radioss_sensors import require_forces
+from d2rpick.deck.reader import read_deck
+from d2rpick.deck.sensor_cards import write_flight_sensors
+from d2rpick.deck.suiting import find_suiting
+from d2rpick.deck.switch_sets import Waiting, write_set_pair
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from d2rpick.deck.model import Inventory
+    from d2rpick.deck.reader import Deck
+
+# Number of engine files in which the OpenRadioss starter reads /RBODY/OFF.
+_MOST_LEGS: Final = 9
+# Ratio of the force-free time that shows a flight to the largest time step while parts are rigid [-].
+# With this time-step limit, a contact is detected at most one time step late.
+_STEPS_PER_WAIT: Final = 300
+# Ratio of the required force-free time to the time for which LS-DYNA ignores contacts after a switch [-].
+_DELAYS_PER_WAIT: Final = 100
+# Radioss keywords of loads that are not contact forces.
+_LOADS: Final = ("CLOAD", "PLOAD", "MONVOL", "LOAD", "PRELOAD", "LASER", "PFLUID")
+_UNSEEN: Final = "acts without a contact, so contacts do not show the flight"
+_OF_ALL: Final = (
+    "A first run: without a reference run the energy at td is unknown, so tr is not matched to it.",
+    "Only contact forces are monitored: apart from gravity, nothing else may act on the parts.",
+)
+_OF_RADIOSS: Final = (
+    "Each deformable engine run ends when no contact has had a force for the force-free time.",
+    "No window keeps a margin: each rigid engine run ends in the first step of a contact, at most {cap:g} into it.",
+    "A contact of the parts with each other counts too: while it has a force, they do not fly.",
+    "Engine runs after the end of the run take one step.",
+)
+_OF_WALLS: Final = (
+    "A rigid body that meets a rigid wall in the last step of its engine run is stopped in that step: in a test it had"
+    " a momentum of 511 afterwards, a deformable body 365. d2rpick drive keeps a margin before the wall."
+)
+_OF_LS_DYNA: Final = (
+    "CODE 2 has no force-free time: after TIME1, zero force makes parts rigid, even between two pulses.",
+    "These switches do not react to other contacts, rigid walls and loads.",
+    "These cards were not tested with the solver.",
+)
+_DELETED: Final = (
+    "Constraints that all lie on these parts are deleted while the parts are rigid (NRBF or NCSF 1), and then activated"
+    " again (2)."
+)
+_AT_REST: Final = "In free fall from rest: rigid from 0, TIME1 0."
+_OF_LOAD: Final = "TIME1 is 0: if you know the end of the load, give it (--after)."
+_WITHOUT_OFFSET: Final = (
+    "OFFSET 0: the parts become deformable in the contact; only automatic contacts of shells"
+    " have a margin."
+)
+# _PUSHES: prefixes of the LS-DYNA keywords for loads that are not contact forces.
+# _OF_GRAVITY: prefixes of the LS-DYNA keywords that define gravity.
+_PUSHES, _OF_GRAVITY = ("LOAD_", "AIRBAG_"), ("LOAD_BODY", "LOAD_GRAVITY")
+# LS-DYNA makes the parts deformable once the gap before a contact is this multiple of the largest shell thickness [-].
+# The gap must exceed the contact thickness, i.e. half the thickness of each of the two shells.
+_OFFSET_THICKNESSES: Final = 2
+
+
+def print_first_run_cards(
+    path: str,
+    inventory: Inventory,
+    parts: Sequence[int],
+    wait: float,
+    reason: str,
+    after: float | None,
+) -> PrintedCard:
+    """Print the cards with which the first run of a deck switches its parts after the given force-free time.
+
+    Parameters
+    ----------
+    path : str
+        Main deck of LS-DYNA, or a file of a Radioss run with one engine file.
+    inventory : Inventory
+        The inventory of this deck.
+    parts : sequence of int
+        Parts to be switched.
+    wait : float
+        Force-free time that shows a flight [time].
+    reason : str
+        Origin of this time.
+    after : float or None
+        No part becomes rigid before this time [time].
+
+    Returns
+    -------
+    PrintedCard
+        With notes for the user.
+
+    Raises
+    ------
+    DeckError
+        If the deck has no contact that shows a flight, or if other loads than contacts and gravity act on the parts.
+    """
+    if inventory.solver == "radioss":
+        return _print_radioss_cards(path, inventory, parts, wait, reason, after)
+    return _print_ls_dyna_cards(path, inventory, parts, wait, reason, after)
+
+
+# The functions below write the cards for Radioss.
+
+
+def _print_radioss_cards(
+    path: str,
+    inventory: Inventory,
+    parts: Sequence[int],
+    wait: float,
+    reason: str,
+    after: float | None,
+) -> PrintedCard:
+    """Print the engine files and sensors of a Radioss run; raise DeckError unless contact forces reveal a flight."""
+    run, bodies = read_run(path), find_bodies(path, parts)
+    if run.starter is None or len(run.legs) != 1:
+        raise DeckError(
+            f"{path}: the run has {len(run.legs)} engine files; its starter deck and one were expected"
+        )
+    for load in run.starter.named(*_LOADS):
+        raise DeckError(f"{load.at}: /{load.name} {_UNSEEN}")
+    contacts = require_forces(path, run.starter)
+    (leg,) = run.legs
+    starts_moving = run.starter.named("INIVEL") or leg.starts
+    at_rest = after is None and bool(inventory.boundary.gravity) and not starts_moving
+    sensors, contact, flight = write_flight_sensors(
+        contacts, wait, max(after or 0.0, wait), bodies.sensor
+    )
+    largest_step = float(f"{wait / _STEPS_PER_WAIT:.2g}")
+    other_nodes = [
+        node for node in find_bodies_kept_off(run.legs) if node not in bodies.nodes
+    ]
+    files = {}
+    # The engine runs are alternately deformable and rigid. The first one is rigid if the parts fall from rest.
+    for number in range(1, _MOST_LEGS + 1 - at_rest):
+        rigid = number % 2 == at_rest
+        file = EngineFile(number, leg.stop.value, largest_step if rigid else None)
+        lines = [*write_engine_lines(file, leg.name, bodies.nodes, other_nodes)]
+        if number < _MOST_LEGS - at_rest:
+            lines += ["/STOP/LSENSOR", str(contact if rigid else flight), "0 0 0 0 0 0"]
+        files[f"{leg.name}_{number:04d}.rad"] = "\n".join(lines) + "\n"
+    explanation = _explain_wait(wait, reason)
+    if at_rest:
+        explanation = f"in free fall from rest: rigid from 0; then {explanation}"
+    of_radioss = [note.format(cap=largest_step) for note in _OF_RADIOSS]
+    notes = [explanation, *bodies.notes, *_OF_ALL, *of_radioss]
+    if run.starter.named("RWALL"):
+        notes.append(_OF_WALLS)
+    head = "".join(f"# {line}\n" for line in write_comments([*notes, *PHYSICS]))
+    return PrintedCard(head, (), files, tuple(notes), bodies.cards + sensors)
+
+
+def _explain_wait(wait: float, reason: str) -> str:
+    """Return the note on the force-free time that shows a flight."""
+    return f"force-free time that marks a flight: {wait:.4g}; {reason}"
+
+
+# The functions below write the cards for LS-DYNA.
+
+
+def _print_ls_dyna_cards(
+    path: str,
+    inventory: Inventory,
+    parts: Sequence[int],
+    wait: float,
+    reason: str,
+    after: float | None,
+) -> PrintedCard:
+    """Print the switch sets of an LS-DYNA run; raise DeckError unless the force of one contact reveals a flight."""
+    deck = read_deck(path)
+    contact, keyword = _find_contact(path, deck)
+    part_ids = check_ids(parts)
+    suiting = find_suiting(path, part_ids)
+    printing = Printing(
+        part=tuple(part_ids),
+        bodies=inventory.bodies(part_ids),
+        swset=suiting.swset or Printing().swset,
+        delete_nodal_bodies=suiting.delete_nodal_bodies,
+        delete_node_sets=suiting.delete_node_sets,
+    )
+    offset, offset_note = _choose_offset(inventory, keyword)
+    notes = [_explain_wait(wait, reason), *_OF_ALL, *_OF_LS_DYNA, offset_note]
+    if suiting.delete_nodal_bodies or suiting.delete_node_sets:
+        notes.append(_DELETED)
+    if after is None:
+        starts_moving = deck.named("INITIAL_VELOCITY")
+        at_rest = bool(inventory.boundary.gravity) and not starts_moving
+        notes.append(_AT_REST if at_rest else _OF_LOAD)
+    delay = wait / _DELAYS_PER_WAIT
+    lines = [f"$ {line}" for line in write_comments([*notes, *PHYSICS])]
+    lines += write_set_pair(
+        printing.swset,
+        (write_number(after or 0.0), "0.0"),
+        write_number(delay),
+        part_ids,
+        printing,
+        waits=(
+            Waiting(2, contact, delay),
+            Waiting(4, contact, wait, offset=offset),
+        ),
+    )
+    text = "\n".join(lines) + "\n"
+    return PrintedCard(text, (), {"switches.k": text}, tuple(notes))
+
+
+def _find_contact(path: str, deck: Deck) -> tuple[int, str]:
+    """Return the id and keyword of the contact for which a switch can wait; raise DeckError if there is none."""
+    for card in deck.cards:
+        if card.name.startswith(_PUSHES) and not card.name.startswith(_OF_GRAVITY):
+            raise DeckError(f"{card.at}: *{card.name} {_UNSEEN}")
+    entities = read_entities(deck, "CONTACT")
+    contacts = [contact for contact in entities.found if contact.triggers]
+    if entities.all_known and len(contacts) == 1:
+        return contacts[0].id or contacts[0].number, contacts[0].keyword
+    count = len(contacts) if entities.all_known else "unknown"
+    raise DeckError(
+        f"{path}: {count} contacts between surfaces, or of nodes with a surface; one was expected: a switch waits for"
+        " one, and single-surface contacts never trigger it"
+    )
+
+
+def _choose_offset(inventory: Inventory, keyword: str) -> tuple[float, str]:
+    """Return the gap between surfaces at which the parts are made deformable again [length], with a note."""
+    thicknesses = [part.section.thickness for part in inventory.parts.values()]
+    thickest = max((thickness or 0.0 for thickness in thicknesses), default=0.0)
+    if not keyword.startswith("CONTACT_AUTOMATIC_") or thickest <= 0:
+        return 0.0, _WITHOUT_OFFSET
+    offset = float(write_number(_OFFSET_THICKNESSES * thickest))
+    return offset, (
+        f"OFFSET {offset:g}: the parts are deformable before the contact, "
+        f"{_OFFSET_THICKNESSES} shell thicknesses from it."
+    )
