@@ -390,7 +390,9 @@ def test_another_motion_of_the_switched_run_is_an_objection(
     assert comparison["tr_ok"]
     assert any("so it moves differently" in reason for reason in comparison["reasons"])
     text = " ".join(run(*args).stdout.split())
-    assert text.startswith("comparison failed: mean energy after td 0.69 times that")
+    assert text.startswith(
+        "comparison failed: mean energy after td 69% of the reference run (limits 70% to 130%)"
+    )
     verdict, why = text.split(f" do not use tr = {TR}, td = {TD} ")
     assert "(limits 70% to 130%)" in verdict
     assert "from that of the reference run, so it moves differently" in why
