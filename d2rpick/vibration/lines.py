@@ -148,7 +148,7 @@ def make_even_grid(time: Samples, energy: Samples) -> Grid:
 
 
 def _count_turns(time: Samples, values: Samples) -> tuple[float, float]:
-    """Return the number of cycles in times (n,) at the highest relevant frequency, and at the highest strong one."""
+    """Return the numbers of cycles that the highest relevant and highest strong frequencies complete in times (n,)."""
     reach = time - time[0]
     trend = np.polyval(np.polyfit(reach, values, 2), reach)
     power = np.abs(np.fft.rfft((values - trend) * np.hanning(time.size))) ** 2
@@ -324,7 +324,7 @@ class _SignalSpace:
     def of(cls, grid: Grid) -> _SignalSpace:
         """Compute the signal subspace of a grid."""
         lags = min(grid.time.size // 2, _MOST_LAGS)
-        # A copy, which is multiplied by itself in half the time of overlapping views.
+        # The views are copied, because the matrix product of overlapping views would take twice as long.
         windows = np.ascontiguousarray(
             np.lib.stride_tricks.sliding_window_view(grid.energy, lags)
         )

@@ -501,7 +501,7 @@ def describe_energy_at(
 
 
 def _find_aliasing(history: History, fit: Identification) -> tuple[str, ...]:
-    """Return a doubt if the energy oscillates so fast that its states show neither the vibration nor the level."""
+    """Return a warning text if the states are too few per period to show the vibration and the energy level."""
     if fit.mode is None or fit.misfit is None or fit.misfit > MAX_MISFIT:
         return ()
     time, _ = history.between(fit.start, fit.end)

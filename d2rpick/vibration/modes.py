@@ -24,7 +24,8 @@ BLOCK: Final = 8192
 _STEPS = 64
 # Relative rounding error of a double [-].
 _EPS = float(np.finfo(np.float64).eps)
-# Largest energy that may be a solver error, as a fraction of the highest energy [-]; typical errors are 1/10 of it.
+# Largest energy that may be a solver error, as a fraction of the highest energy [-].
+# Typical solver errors are 1e-5 of the highest energy.
 SOLVER_FLOOR: Final = 1e-4
 # Largest deformation that is treated as zero, as a fraction of the amplitude [-].
 _ZERO = 1e-9
