@@ -272,7 +272,7 @@ class Request(ChoiceOptions, ReadingOptions):
         return (*self.checking(), *self.asking(("part",)))
 
     def repeat(self, *, without: Collection[str] = ()) -> RepeatedQuestion:
-        """Return the parts of the command line with which other commands ask about the same run."""
+        """Return the parts, options and files with which other commands ask about the same run."""
         from d2rpick.report.formats import RepeatedQuestion
 
         left_out = {"part", *without}

@@ -231,7 +231,7 @@ def _make_answer(number: int, future: Future[Any]) -> Finished:
 
 def _begin_work(held: Connection) -> None:
     """Exit this process when the other end of ``held`` is closed; an interrupt ends the process without a message."""
-    # A spawned process still has this handler; in a forked process, `interruptible` has already changed it.
+    # A spawned process still has Python's own handler; in a forked process, `interruptible` has already replaced it.
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, signal.SIG_DFL)
 

@@ -34,10 +34,10 @@ if TYPE_CHECKING:
 _OWN_ERROR: Final = 1e-3
 # If the work of gravity deviates from a parabola by at most this fraction, damping may be the reason [-].
 _BENT: Final = 1e-2
-# States are used to compute the mass if their squared speed is at least this fraction of the largest one [-].
+# States are used to compute the mass if their squared speed is at least this fraction of the largest [-].
 _SLOW: Final = 1e-2
 # Safety factor on the mass computed from kinetic energy and velocity [-].
-# That mass may be too small, because a table may contain the kinetic energy of only the chosen parts.
+# The computed mass may be too small, because a table may contain the kinetic energy of only the chosen parts.
 # A load that does work like gravity without moving the model would need a much larger mass.
 _MASS_ERROR: Final = 2.0
 # Work up to this fraction of the internal-energy range is treated as zero [-].

@@ -422,7 +422,7 @@ class History:
 
     def check_unit(self, *times: float, argument: str) -> None:
         """Raise RangeError if the times of an ``argument`` seem to have another unit than the record."""
-        # Usually, no time lies below 1/1000 of the record, and no further check is needed.
+        # A time above 1/1000 of the end of the record has the right unit, so no further check is needed.
         if times[-1] * 1e3 > self.time[-1]:
             return
         from d2rpick.histories.digits import ask_for_larger_unit

@@ -192,7 +192,7 @@ class OpenedRun:
             )
         )
         if values is None or not values.size:
-            # A database without some of the momenta cannot show which parts fly together.
+            # If the momenta of some parts are missing, the database cannot show which parts fly together.
             return None
         precision = holder.precisions(())[1]
         masses = self._least_masses(values, holder)

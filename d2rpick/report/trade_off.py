@@ -213,7 +213,7 @@ def list_costs_of_other_offers(trade_off: TradeOff) -> list[tuple[str, str]]:
 
 
 def _warn_about_refused(offer: Offer) -> str:
-    """Return the verdict in parentheses if the pair of an offer cannot be used; otherwise ""."""
+    """Return the verdict in parentheses if a proposed pair cannot be used; otherwise ""."""
     decision = offer.decision
     refused = decision is not None and decision.verdict == DO_NOT_USE
     return f" ({DO_NOT_USE})" if refused else ""

@@ -35,7 +35,7 @@ _BEGINNINGS, _ENDS = (0.6, 0.36, 0.22, 0.13), (0.5, 0.25, 0.12)
 # Further trial windows end at these distances before td, as fractions of the time from the start to td [-].
 # Further trial windows are needed if td lies in the next contact.
 _EARLIER_ENDS = (0.1, 0.2, 0.35)
-# Windows begin and end at fixed marks, so that neighbouring td share windows and fits.
+# Windows begin and end at fixed times (marks), so that neighbouring td share windows and fits.
 # Ratio of the distances of successive marks from the start [-].
 _MARKS = 0.87
 # _LEAST_PERIODS: smallest number of periods in a window that an oscillator describes; fewer may fit by chance.
@@ -394,7 +394,7 @@ def _list_windows_around(bounds: Span, td: float, *, whole: bool) -> Iterator[Sp
 
 
 def _mark(bounds: Span, time: float, after: int = 0) -> float:
-    """Return the last mark up to ``time`` or, if ``after`` is 1, the first mark after it; the bounds count as marks."""
+    """Return the last fixed mark up to ``time`` or, if ``after`` is 1, the first mark after it; the bounds are marks."""
     start, end = bounds
     if time <= start:
         return start

@@ -149,7 +149,7 @@ class Decision(NamedTuple):
 
     @property
     def is_limited_by_raised_grade(self) -> bool:
-        """True if the vibration grade determines the verdict and was raised because its error is negligible."""
+        """True if the verdict rests on a vibration grade that was raised because the vibration error is negligible."""
         vibration = self.quality.vibration
         is_raised = self.quality.alone.grade != vibration.grade
         return is_raised and vibration.grade == self.grade

@@ -464,7 +464,7 @@ def _describe_unknown_direction(situation: Situation) -> Cause:
 
 
 def omit_comparison(quality: Quality) -> Quality:
-    """Return the grades without the advice to compare with a finished switched run, because that has been done."""
+    """Return the grades without the advice to compare with a switched run, for use after this comparison."""
 
     def omit(grade: Grade) -> Grade:
         causes = [

@@ -350,7 +350,7 @@ class Blocks(Database):
         return position, stride, self._count(position, position, stride)
 
     def _repeated(self, last: Stretch, recent: list[tuple[int, int]]) -> int:
-        """Return the offset of a recent block that resembles the last block; if there is none, that of the last block."""
+        """Return the offset of a recent block that resembles the last block; if there is none, that of the last."""
         alike = (
             example
             for example, stride in recent
