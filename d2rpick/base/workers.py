@@ -116,7 +116,7 @@ class Cores(Farm):
         """
         self._is_closed = True
         self._leash.close()
-        # After an interrupt, the thread that uses the pool may hold its lock for ever: it waits for a dead process.
+        # After an interrupt, the pool's thread may keep its lock for ever, because it waits for a dead process.
         if KeyboardInterrupt not in exception:
             self._pool.shutdown(wait=True, cancel_futures=True)
 
@@ -190,7 +190,7 @@ class Cores(Farm):
     def _answer_alone(
         self, number: int, function: Callable[[Item], Result], item: Item
     ) -> Finished:
-        """Execute a call in a pool of its own, so that a crash of its process affects no other call."""
+        """Execute a call in a separate pool, so that a crash of its process affects no other call."""
         pool, future = self._begin_pool(1, function, item)
         answer = _make_answer(number, future)
         pool.shutdown(wait=False)

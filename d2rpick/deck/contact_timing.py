@@ -1,4 +1,4 @@
-"""Find settings with which switches that a contact force triggers make parts rigid in the planned windows.
+"""Find settings with which force-triggered switches make parts rigid in the planned windows.
 
 These are TIME1, TIME2, TIME3 and OFFSET of an LS-DYNA pair, or Tdelay of a Radioss sensor. A force switch has no times
 of its own. One wait for all windows is chosen so that, with the known contact times of a run, the resulting windows are
@@ -37,7 +37,7 @@ class Pushes(NamedTuple):
 
 
 class ForceTiming(NamedTuple):
-    """Times of a switch by a force, and the windows in which it makes parts rigid.
+    """Times of a force-triggered switch, and the windows in which it makes parts rigid.
 
     The switch acts between ``earliest`` and ``latest``. ``wait`` is TIME3 of the set that makes parts deformable, or
     Tdelay. ``offset`` is a distance, 0 if the card has no offset.

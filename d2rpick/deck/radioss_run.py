@@ -403,7 +403,7 @@ def find_rigid_parts(
         for node in bodies
     }
     all_parts = starter.parts.keys()
-    # Other parts, e.g. a skin, may use only nodes of the named parts.
+    # A body also contains parts whose nodes all belong to its named parts, e.g. a skin.
     incomplete = {
         node: found for node, found in known_members.items() if all_parts - found[1]
     }

@@ -257,7 +257,7 @@ def find_balanced_window(balance: Balance, td: float) -> FreeFlight | None:
     noise = balance.precision.noise(np.stack(terms))
     if noise > _OWN_ERROR * extent:
         return None
-    # The first law is tried before the second, because the second has one more parameter, which could fit a load.
+    # The law without vibration is tried first, because the additional parameter of the other law could fit a load.
     exact, ringing = _make_laws_of_work(balance)
     window = find_lasting_window(exact, td, extent, noise)
     if window is None:
@@ -415,7 +415,7 @@ def _list_terms(balance: Balance) -> list[Samples]:
 
 
 class _Parabola(Law):
-    """Law that energies are parabolas in time, apart from damping, which removes a fraction of the kinetic energy.
+    """Law of parabolic energies over time, except for damping, which removes a fraction of the kinetic energy.
 
     Solvers compute velocities half a step away from positions, which adds the rate of the ``internal`` energy.
     """

@@ -30,7 +30,7 @@ Record = TypeVar("Record", bound="History | Balance | Momenta")
 
 # Largest energy that is accepted [energy]; the squares of larger energies overflow a double.
 LARGEST_ENERGY: Final = 1e150
-# Parts are treated as at rest up to this fraction of the speed of the fastest part [-]; rounding leaves such speeds.
+# Largest speed that is treated as rest, relative to the speed of the fastest part [-]; it may be a rounding error.
 _STILL: Final = 1e-6
 # Number of times at which the energy is interpolated in one step; it is small to keep the work arrays small.
 _TOGETHER: Final = 1 << 14

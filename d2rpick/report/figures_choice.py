@@ -326,7 +326,7 @@ def draw_plan(plan: RunPlan, *, page: bool = False) -> Figure:
 
 
 def _name_window_kind(row: PlannedFlight) -> str:
-    """Return the verdict on a window that this run supports or, without a verdict, what must be done first."""
+    """Return the verdict on a window that needs no further run first; for any other window, return its status."""
     if row.status == "supported" and row.decision:
         return row.decision.verdict
     return row.status

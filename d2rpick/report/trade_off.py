@@ -424,7 +424,7 @@ def _number_offer_reasons(offers: Sequence[Offer]) -> dict[str, int]:
 
 
 def _format_verdict(offer: Offer, numbers: Mapping[str, int]) -> str:
-    """Return the verdict on a proposed pair, with the number of its reason."""
+    """Return the verdict on a proposed pair, with the number under which its reason is listed."""
     decision = offer.decision
     return format_with_number(decision, numbers) if decision else "no admissible tr"
 

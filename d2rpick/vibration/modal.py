@@ -293,7 +293,7 @@ class ModalVibration:
     def _compute_errors(
         self, tr: Samples | float, td: Samples | float
     ) -> tuple[Samples, Samples, Samples]:
-        """Return the error of the squared residual of pairs of times, and how far other readings lower or raise it [-].
+        """Return the error of the squared residual of pairs, and how far other interpretations lower and raise it [-].
 
         Alternatives are other interpretations of the lines, and what the kinetic energy says: each is on one side.
         """
@@ -627,7 +627,7 @@ def _read(
 
 
 def _add_hidden_pairs(reading: Reading, systematic: float) -> Reading:
-    """Add to an interpretation the vibration energy without lines that its own modes leave in the mean energy."""
+    """Add to an interpretation the vibration energy that its mean energy contains but its modes do not explain."""
     spectrum = reading.spectrum
     level = reading.level_of_modes(reading.times)
     static = spectrum.mean.at(reading.times) - level / 2

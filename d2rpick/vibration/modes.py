@@ -286,7 +286,7 @@ def compute_energy_and_jacobian(
     swing = cosine * cos + sine * sin
     q = preload + swing
     twice = q + q
-    # The array is filled in place, because identification spends most of its time here.
+    # The array is filled in place to save time, because identification spends most of its time here.
     jacobian = np.empty((size, s.size))
     by_rate = np.multiply(twice, s, out=jacobian[0])
     np.multiply(by_rate, swing, out=jacobian[1])
