@@ -192,9 +192,8 @@ class Pencil(NamedTuple):
             max(_CELLS_PER_PERIOD * periods, _MIN_CELLS), s.size - 1, _MAX_CELLS
         )
         cells = average_cells(s, running, count)
-        # The views are copied, because the matrix product of overlapping views would take twice as long.
-        hankel = np.ascontiguousarray(
-            np.lib.stride_tricks.sliding_window_view(cells, min(_LAGS, count // 2) + 1)
+        hankel = np.lib.stride_tricks.sliding_window_view(
+            cells, min(_LAGS, count // 2) + 1
         )
         return cls(np.linalg.eigh(hankel.T @ hankel)[1][:, ::-1], count)
 

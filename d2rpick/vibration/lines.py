@@ -324,10 +324,7 @@ class _SignalSpace:
     def of(cls, grid: Grid) -> _SignalSpace:
         """Compute the signal subspace of a grid."""
         lags = min(grid.time.size // 2, _MOST_LAGS)
-        # The views are copied, because the matrix product of overlapping views would take twice as long.
-        windows = np.ascontiguousarray(
-            np.lib.stride_tricks.sliding_window_view(grid.energy, lags)
-        )
+        windows = np.lib.stride_tricks.sliding_window_view(grid.energy, lags)
         return cls(np.linalg.eigh(windows.T @ windows)[1][:, ::-1], grid.step)
 
     @property

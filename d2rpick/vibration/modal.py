@@ -18,6 +18,7 @@ from d2rpick.vibration import measures
 from d2rpick.vibration.close_modes import find_close_modes
 from d2rpick.vibration.doubts import (
     MOST_BEYOND,
+    MOST_MISSED,
     MOST_NEGATIVE,
     StaticEnergy,
     measure_doubts,
@@ -473,7 +474,9 @@ def identify_modal(
         np.abs(energy).max()
     ):
         return None
-    prediction = refine_prediction(grid, prediction)
+    # What misses more is refused with any lines.
+    if prediction.missed <= MOST_MISSED:
+        prediction = refine_prediction(grid, prediction)
     misfit = prediction.spectrum.error / prediction.swing
     systematic = _correlate_neighbours(prediction.spectrum.rest)
     if not _predicts_within(_SLOW_TOO, prediction.missed, misfit, systematic):
