@@ -382,7 +382,7 @@ def _make_window_of_rigid_part(body: Body) -> SwitchWindow:
 def find_rigid_parts(
     starter: Starter, bodies: Mapping[int, int]
 ) -> dict[int, set[int]]:
-    """Return, by body, the parts that the group of the body names or whose nodes all belong to this group.
+    """Return the parts of each rigid body: those that its group names, and those whose nodes all belong to the group.
 
     Parameters
     ----------

@@ -416,7 +416,7 @@ def _insert_middles(times: Samples) -> Samples:
 
 
 class Roots(NamedTuple):
-    """The narrowed brackets: the end ``within`` on the positive side, the other end ``beyond``, and the root ``at``."""
+    """Narrow brackets around roots: end ``within`` on the positive side, other end ``beyond``, and root ``at``."""
 
     within: Samples
     beyond: Samples

@@ -109,7 +109,7 @@ _RUN_COLOURS: Final = (
     "#56b4e9",
 )
 _PATTERNS: Final = ("-", "--")
-# Up to this number of runs, all are drawn in colour and named; otherwise, only outliers are.
+# Largest number of runs that are all drawn in colour and named; of more runs, only outliers are coloured and named.
 _NAMED: Final = 10
 _MOST_OUTLIERS: Final = 5
 _GREY: Final = "#808080"

@@ -407,7 +407,7 @@ def _get_quiet_window(history: History, quiet: QuietTime | None) -> Span | None:
 
 
 def _covers_most(history: History, described: Described | None) -> bool:
-    """Return True if a window covers enough of the record that no modes need to be fitted."""
+    """Return True if a window covers so much of the record that no modes need to be fitted."""
     if described is None:
         return False
     record = float(history.time[-1] - history.time[0])
