@@ -1,4 +1,4 @@
-"""Determine which parts may be switched and what sets of parts save, and fit element costs to the runs of a site."""
+"""Find the parts that may be switched and the savings of sets of parts, and fit element costs to a site's runs."""
 
 from __future__ import annotations
 
