@@ -19,6 +19,7 @@ from d2rpick.base.options import (
     make_option,
     make_option_name,
 )
+from d2rpick.choice import options as choice_options
 from d2rpick.choice.options import ChoiceOptions, list_uses
 from d2rpick.choice.pair import grades
 from d2rpick.histories.formats import READERS
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
     from d2rpick.vibration.oscillator import Oscillator
 
 MIN_MEAN_ENERGY: Final = grades.MIN_MEAN_ENERGY
+MIN_QUALITY: Final = choice_options.MIN_QUALITY
 # Options for reading a history; a deck that is checked defines its parts itself.
 READING: Final = ("input_format", "time", "energy", "part", "flying", "channel")
 _READING_FOR_CARDS: Final = tuple(name for name in READING if name != "part")
@@ -115,7 +117,7 @@ class Request(ChoiceOptions, ReadingOptions):
     ``given`` names the options that were given, also those given with their default value.
     """
 
-    stiffness: float | None = _make_oscillator_option("Spring k.")
+    stiffness: float | None = _make_oscillator_option("Spring stiffness k.")
     mass: float | None = _make_oscillator_option("Suspended mass M.")
     frame_mass: float | None = _make_oscillator_option(
         "Frame mass m (or give --beta).", POSITIVE, "beta"

@@ -78,7 +78,8 @@ _WINDOW: Final = row(
     Field("file", "text"),
     Field("line", _LINE),
     Field("deck", "text"),
-    Field("verdict", maybe(keys.VERDICT), "what to do with the pair; null if no history judges it", later=True),
+    Field("verdict", maybe(keys.VERDICT), "what to do with the pair; null if no history is given to judge it",
+          later=True),
     Field("verdict_reason", "text?", "reason for the verdict, as text", later=True),
     Field("cure", "text?", "how to improve the pair, as text; empty for a good pair", later=True),
 )  # fmt: skip

@@ -202,7 +202,8 @@ DOCUMENT: Final = Document(
         Field(
             "fewest_cycles",
             "integer?",
-            "fewest time steps of the written run, if one largest step holds throughout, as with sensors; else null",
+            "smallest number of time steps of the written run, if the same maximum time step applies to the whole run, "
+            "as with sensors; otherwise null",
         ),
     ),
 )

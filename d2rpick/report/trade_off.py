@@ -301,8 +301,9 @@ DOCUMENT: Final = Document("d2rpick/explore/1", "Answer of d2rpick explore; time
           "td with which the others are compared: the given td, otherwise the td with the largest saving",
           lambda trade_off: trade_off.start and trade_off.start.td),
     Field("step", "number?",
-          "nearest td with at most half of the error at start and at least half of its rigid time: an energy peak, "
-          "otherwise a Pareto-optimal td, otherwise the recommended td if its error is smaller",
+          "nearest energy peak with at most half of the error at start and at least half of its rigid time, or nearest "
+          "Pareto-optimal td with these properties if no peak has them. If there is neither, the recommended td, if "
+          "its error is smaller than at start",
           lambda trade_off: trade_off.step and trade_off.step.td),
     Field("offers", many(OFFER),
           "evenly spaced values of td, the peaks of the energy, the given td and the recommended td, by ascending td"),

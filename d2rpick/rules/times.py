@@ -396,7 +396,7 @@ def _check_units_of_history(case: Case) -> Iterator[Objection]:
 @make_rule_decorator(
     "D2R207",
     ERROR,
-    "the switching times are about 1000 times those of the history, or 1/1000 of them",
+    "the switching times are about 1000 times the times in the history, or 1/1000 of them",
     BOTH,
 )
 def _check_times_of_history(case: Case) -> Iterator[Objection]:
