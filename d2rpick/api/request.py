@@ -1,4 +1,4 @@
-"""Define in a single table everything that a user can ask about a run.
+"""Define, in a single table, all options of the questions that a user can ask about a run.
 
 The fields of `Request` determine the options of the command line with their environment variables, the keyword
 arguments of Python, and the command line that repeats an answer.
@@ -55,8 +55,8 @@ ADVANCED: Final = (
 )
 JUDGING: Final = (*_READING_FOR_CARDS, *CHOOSING_FOR_CARDS)
 _NOT_TYPED: Final = ("history", "given", "run_folder", "deck_in_folder")
-# Placeholder for weights that were not read from a file.
-# A command line with this placeholder is refused, because the placeholder does not contain the weights.
+# Placeholder in a command line for weights that were not read from a file.
+# d2rpick refuses such a command line, because it does not contain the weights.
 _IN_MEMORY: Final = "<weights in memory>"
 
 
@@ -274,7 +274,7 @@ class Request(ChoiceOptions, ReadingOptions):
         return (*self.checking(), *self.asking(("part",)))
 
     def repeat(self, *, without: Collection[str] = ()) -> RepeatedQuestion:
-        """Return the parts of the command line with which other commands ask about the same run."""
+        """Return the parts, options and files with which other commands ask about the same run."""
         from d2rpick.report.formats import RepeatedQuestion
 
         left_out = {"part", *without}

@@ -265,7 +265,7 @@ def give_plan_sentence(plan: RunPlan) -> str:
 
 
 def _describe_use(plan: RunPlan) -> str:
-    """Describe how many windows can be used now, how many only with care, and how many planned windows not at all."""
+    """Describe how many windows can be used now, how many only with care, and how many cannot be used."""
     decisions = [(row.number, row.decision) for row in plan.supported if row.decision]
     if len(decisions) == 1:
         number, decision = decisions[0]

@@ -279,7 +279,7 @@ def list_outcome(answer: StudyOfRuns) -> list[tuple[str, str]]:
 
 
 def _name_error(answer: StudyOfRuns) -> str:
-    """Return the name of the errors at the common tr, which depend on the basis of the runs."""
+    """Return the name of the errors at the common tr: residual, level error, or error if the runs have both."""
     bases = {row.basis for row in answer.runs if row.judged}
     if "energy" not in bases:
         return "residual"

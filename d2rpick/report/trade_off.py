@@ -213,7 +213,7 @@ def list_costs_of_other_offers(trade_off: TradeOff) -> list[tuple[str, str]]:
 
 
 def _warn_about_refused(offer: Offer) -> str:
-    """Return the verdict in parentheses if the pair of an offer cannot be used; otherwise ""."""
+    """Return the verdict in parentheses if a proposed pair cannot be used; otherwise ""."""
     decision = offer.decision
     refused = decision is not None and decision.verdict == DO_NOT_USE
     return f" ({DO_NOT_USE})" if refused else ""
@@ -425,7 +425,7 @@ def _number_offer_reasons(offers: Sequence[Offer]) -> dict[str, int]:
 
 
 def _format_verdict(offer: Offer, numbers: Mapping[str, int]) -> str:
-    """Return the verdict on a proposed pair, with the number of its reason."""
+    """Return the verdict on a proposed pair, with the number under which its reason is listed."""
     decision = offer.decision
     return format_with_number(decision, numbers) if decision else "no admissible tr"
 

@@ -101,7 +101,7 @@ class _Flags(NamedTuple):
 
 
 def _find_flags(case: Case, card: SwitchSet) -> _Flags | None:
-    """Return the flags of a card. Restarts have them on *RIGID_DEFORMABLE_CONTROL, and plain cards have none."""
+    """Return the flags of a card or, in a restart, of *RIGID_DEFORMABLE_CONTROL; None if the card has no flags."""
     if card.header:
         nrbf = card.header.nrbf
         ncsf = card.header.ncsf
