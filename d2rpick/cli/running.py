@@ -226,8 +226,8 @@ def follow(
 @options.make_click_option(
     "part",
     Option(
-        "Parts to switch, by number (3,7) or range (10-19).  [default for Radioss: parts of the rigid bodies that the "
-        "deck deactivates]",
+        "Parts to switch, by number (3,7) or range (10-19).  [default: for Radioss, parts of the rigid bodies that "
+        "the deck deactivates]",
         *("names", "IDS"), many=True,
     ),
 )  # fmt: skip
