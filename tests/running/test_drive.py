@@ -284,7 +284,7 @@ def test_a_leg_that_a_probe_replaced_is_not_computed_again_if_the_window_is_not_
     assert np.diff(joined.time) == pytest.approx(0.001, abs=1e-5)
     assert not (tmp_path / "run" / "replaced").exists()
     # Without the files that were set aside, the leg is computed again; the run stays the same.
-    monkeypatch.setattr(engine.Solver, "restore", lambda *_: None)
+    monkeypatch.setenv("D2RPICK_FAKE", "lost")
     (again := tmp_path / "again").mkdir()
     computed = run(*prepare_drive(again, *options))
     assert "engine run 4: load from 0.058 to 0.065\n" in computed.stderr
