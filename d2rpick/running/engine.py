@@ -156,7 +156,7 @@ class Solver:
     def __init__(self, folder: Path, name: str, commands: Commands) -> None:
         self.folder, self.name, self.commands = folder, name, commands
         self._lock_path = folder / ".solver.lock"
-        self._replaced = folder / "replaced"
+        self._replaced = folder / ".drive.replaced"
         self._process: subprocess.Popen[bytes] | None = None
         self._signal = 0  # Number of the signal that ended the last process, or 0.
 

@@ -81,7 +81,7 @@ def run_engine(deck: Path) -> None:
     if fault == "hang" and number == 2:
         time.sleep(1000)
     if fault == "lost":
-        shutil.rmtree("replaced", ignore_errors=True)
+        shutil.rmtree(".drive.replaced", ignore_errors=True)
     cycles = 0
     with history.open("wb") as stream:
         while step * STEP <= end + 1e-9:

@@ -282,7 +282,7 @@ def test_a_leg_that_a_probe_replaced_is_not_computed_again_if_the_window_is_not_
     paths = sorted((tmp_path / "run").glob("stripT??"))
     joined = open_run([str(path) for path in paths]).databases[0]
     assert np.diff(joined.time) == pytest.approx(0.001, abs=1e-5)
-    assert not (tmp_path / "run" / "replaced").exists()
+    assert not (tmp_path / "run" / ".drive.replaced").exists()
     # Without the files that were set aside, the leg is computed again; the run stays the same.
     monkeypatch.setenv("D2RPICK_FAKE", "lost")
     (again := tmp_path / "again").mkdir()
@@ -300,7 +300,7 @@ def test_files_are_set_aside_and_restored_even_if_a_driver_was_stopped_in_betwee
     names = ["strip_0004.rad", "strip_0004_0001.rst", "stripT04", "strip_0004.out"]
     for name in names:
         put(tmp_path / name, f"{name} NORMAL TERMINATION".encode())
-    aside = tmp_path / "replaced"
+    aside = tmp_path / ".drive.replaced"
     aside.mkdir()
     (tmp_path / names[0]).rename(aside / names[0])  # the driver was stopped here
     solver.set_aside(4)
