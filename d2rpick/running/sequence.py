@@ -25,9 +25,9 @@ LOAD, PROBE, RIGID = "load", "probe", "rigid"
 # Times that differ by at most this are treated as equal [output intervals].
 # A history may end one output interval early.
 _STATES: Final = 1.5
-# If only this many engine-run numbers are left, no further flight is switched, so that the run can reach its end.
+# If only this many engine runs are left, no further flight is switched, so that the run can reach its end.
 _KEPT_BACK: Final = 10
-# Shortest deformable engine run in a flight, relative to the force-free time that shows a flight [-].
+# Shortest deformable engine run in a flight, relative to the force-free time after which a flight is detected [-].
 _LEAST: Final = 0.25
 # Length of a deformable engine run while the vibration period is unknown, as a fraction of the run [-].
 _UNKNOWN: Final = 0.02
@@ -40,7 +40,7 @@ _RESTART: Final = 10
 # Shortest flight that is switched, in half periods of the slowest vibration [-].
 # In shorter flights, the frozen vibration shifts the landing too much.
 # After flights of 2.4 and 2.8 half periods, two soft boxes landed 33 ms and 55 ms late.
-# After flights of at least 3.2 half periods, cars and boxes landed within 3.4 ms of the right time.
+# After flights of at least 3.2 half periods, cars and boxes landed at most 3.4 ms too early or too late.
 _SWINGS: Final = 3.0
 # Smallest saving for which a window is worthwhile, relative to the cost of a deformable run [-].
 # Smaller savings do not justify the shift of later landings, which reached 37 ms for two computed boxes.
@@ -220,7 +220,7 @@ def _starts_window(last: Order, findings: LegFindings, limits: Limits) -> bool:
 
 
 def _order_load(last: Order, findings: LegFindings, limits: Limits) -> Order:
-    """Schedule a deformable engine run that ends once a current or past flight has lasted for the required time.
+    """Schedule a deformable engine run that is long enough to detect a flight that starts now or has already started.
 
     The flight in which a window ends is not switched again.
     """
@@ -352,12 +352,12 @@ def collect_joined_legs(order: Order, legs: Sequence[Leg]) -> list[Order]:
 
 
 def get_flight_findings(legs: Sequence[Leg]) -> LegFindings:
-    """Return the findings about the flight that was then switched, at the end of the last deformable engine run."""
+    """Return the findings about the switched flight, as they were at the end of the last deformable engine run."""
     return next(leg.findings for leg in reversed(legs) if leg.order.kind == LOAD)
 
 
 def windows(legs: Sequence[Leg], limits: Limits) -> list[Window]:
-    """Return all flights so far, whether switched or left deformable, in the order of their starts."""
+    """Return all flights so far in order of start time, whether the parts were switched or stayed deformable."""
     by_start: dict[float, Window] = {}
     for count, leg in enumerate(legs, start=1):
         for start, end in leg.findings.short:

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 _MOST_STATIC, _LEAST_CHANGE = 1.0, 0.1
 # Number of the strongest lines, each of which may be that of two modes.
 _STRONGEST: Final = 3
-# Two modes describe the record as well if twice the logarithm of the likelihood falls by at most this [-].
+# Two modes describe the record equally well if twice the logarithm of the likelihood falls by at most this [-].
 _AS_WELL: Final = 4.0
 # _MOST_STEPS: largest number of steps of the fit; ten are usual.
 # _CONVERGED: the fit ends with a step that reduces the sum of squares by at most this fraction [-].

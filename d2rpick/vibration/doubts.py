@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 _CHECKED: Final = 90
 
 # Largest prediction error of an accepted record, relative to the range of the energy [-].
-_MOST_MISSED: Final = 0.5
+MOST_MISSED: Final = 0.5
 # Largest misfit of an accepted record, relative to the range of the energy [-].
 _MOST_MISFIT: Final = 0.3
 # MOST_NEGATIVE: largest absolute value of a negative static energy, relative to the mean vibration energy [-].
@@ -73,7 +73,7 @@ class Doubts(NamedTuple):
                 f"{self.coarse:.2g} states per period of the energy are too few",
             ),
             (
-                self.missed > _MOST_MISSED,
+                self.missed > MOST_MISSED,
                 "the first part of the flight does not predict the rest",
             ),
             (self.misfit > _MOST_MISFIT, "lines do not describe the energy"),

@@ -148,7 +148,7 @@ def make_even_grid(time: Samples, energy: Samples) -> Grid:
 
 
 def _count_turns(time: Samples, values: Samples) -> tuple[float, float]:
-    """Return the number of cycles in times (n,) at the highest relevant frequency, and at the highest strong one."""
+    """Return the numbers of cycles that the highest relevant and highest strong frequencies complete in times (n,)."""
     reach = time - time[0]
     trend = np.polyval(np.polyfit(reach, values, 2), reach)
     power = np.abs(np.fft.rfft((values - trend) * np.hanning(time.size))) ** 2
