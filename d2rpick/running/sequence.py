@@ -1,7 +1,8 @@
 """Choose the next engine run (leg) of a run that chooses its own switching times, from the results so far.
 
 The end of a leg is fixed before the leg begins.  The same command therefore computes the same legs, however fast the
-machine is.  A leg that replaces a discarded one gets its number.
+machine is.  A leg that replaces a discarded one gets its number.  If a probe has replaced a deformable leg and its
+window is not used, that leg follows once more.
 """
 
 from __future__ import annotations
@@ -150,7 +151,10 @@ class LegFindings(NamedTuple):
 
 
 class Leg(NamedTuple):
-    """A completed engine run, with its number of ``cycles`` and CPU time ``cpu`` [s]; both None without a listing."""
+    """A completed engine run, with its number of ``cycles`` and CPU time ``cpu`` [s]; both None without a listing.
+
+    Both are zero if the engine run was replaced by a probe and then taken back instead of being computed again.
+    """
 
     order: Order
     findings: LegFindings
@@ -258,8 +262,11 @@ def _return_before_contact(legs: Sequence[Leg], limits: Limits) -> Order:
     orders = collect_joined_legs(legs[-1].order, legs)
     findings = get_flight_findings(legs)
     if window.reason:
+        switch_after = window.tr + limits.same
+        if replaced := find_replaced_leg(orders[0], legs):
+            return replaced.order._replace(switch_after=switch_after)
         load = _order_load(orders[0].undone(), findings, limits)
-        return load._replace(switch_after=window.tr + limits.same)
+        return load._replace(switch_after=switch_after)
     orders_before = [order for order in orders if order.until <= window.td]
     if not orders_before:
         return orders[0]._replace(kind=RIGID, until=window.td)
@@ -304,9 +311,14 @@ def _explain_too_little_saved(
     """
     if td <= tr:
         return "its margin begins before tr"
-    deformable_legs = [leg for leg in legs if not leg.order.rigid and leg.cycles]
-    length = sum(leg.length for leg in deformable_legs)
-    cycles = sum(leg.cycles or 0 for leg in deformable_legs)
+    # An engine run that was taken back counts once, even if it had to be computed again.
+    deformable_legs = {
+        (leg.order.start, leg.order.until): leg
+        for leg in legs
+        if not leg.order.rigid and leg.cycles
+    }
+    length = sum(leg.length for leg in deformable_legs.values())
+    cycles = sum(leg.cycles or 0 for leg in deformable_legs.values())
     cost = 0.0  # The cost is measured in deformable cycles.
     for leg in legs:
         if leg.order.rigid and leg.order.start >= tr:
@@ -315,6 +327,17 @@ def _explain_too_little_saved(
     if saved >= _WORTH:
         return None
     return f"saves {max(saved, 0.0):.1%} of the run, less than {_WORTH:.0%}"
+
+
+def is_same_run(first: Order, second: Order) -> bool:
+    """Return True if two orders describe the same engine run, whichever of its flights may be switched."""
+    return first._replace(switch_after=second.switch_after) == second
+
+
+def find_replaced_leg(probe: Order, legs: Sequence[Leg]) -> Leg | None:
+    """Return the deformable engine run that was replaced when the probe began; None if the probe began at its end."""
+    last_load = next(leg for leg in reversed(legs) if leg.order.kind == LOAD)
+    return last_load if last_load.order.number == probe.number else None
 
 
 def collect_joined_legs(order: Order, legs: Sequence[Leg]) -> list[Order]:
