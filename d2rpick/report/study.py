@@ -6,9 +6,11 @@ from collections import Counter
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, Final
 
-from d2rpick.choice.pair.grades import GRADES, POOR, VERDICTS
+from d2rpick.choice.pair.grades import GOOD, GRADES, POOR, VERDICTS
+from d2rpick.choice.pair.quality import grade_residual
 from d2rpick.choice.runs.study import (
     OK,
+    Spread,
     StudyOfRuns,
     StudyRow,
     describe_end_of_record,
@@ -257,17 +259,16 @@ def list_outcome(answer: StudyOfRuns) -> list[tuple[str, str]]:
     common = answer.common
     own_tr = "none"
     if spread:
-        own_tr = f"{spread.min:.6g} to {spread.max:.6g}, median {spread.median:.6g}; "
-        own_tr += (
-            "the intervals overlap" if answer.agree else "the intervals do not overlap"
-        )
+        own_tr = _describe_spread(spread, overlaps=bool(answer.agree))
     heading = "common tr"
     shared = f"none: {common.reason}"
     if common.tr is not None and common.window:
         errors = [error for error in common.errors if error is not None]
         heading = VERDICTS[answer.grade] if answer.grade else heading
         runs = f"{answer.judged} of {format_number_of_runs(len(answer.runs))}"
-        shared = f"common tr = {common.tr:g}, for {runs}, {_name_error(answer)} {_format_error_span(errors)}"
+        # Nothing is common to a single run.
+        name = "tr" if answer.judged == 1 else "common tr"
+        shared = f"{name} = {common.tr:g}, for {runs}, {_name_error(answer)} {_format_error_span(errors)}"
         shared += f"; as good: every tr from {format_window(*common.window)}"
     return [
         (heading, shared),
@@ -276,6 +277,15 @@ def list_outcome(answer: StudyOfRuns) -> list[tuple[str, str]]:
         ("td", describe_td(answer)),
         ("own tr", own_tr),
     ]
+
+
+def _describe_spread(spread: Spread, *, overlaps: bool) -> str:
+    """Describe the tr of the runs; several tr also by whether their intervals of accuracy overlap."""
+    if spread.min == spread.max:
+        return f"{spread.median:.6g}"
+    intervals = "overlap" if overlaps else "do not overlap"
+    span = f"{spread.min:.6g} to {spread.max:.6g}, median {spread.median:.6g}"
+    return f"{span}; the intervals {intervals}"
 
 
 def _name_error(answer: StudyOfRuns) -> str:
@@ -326,34 +336,51 @@ def _count_verdicts(answer: StudyOfRuns) -> str:
 
 
 def list_run_reasons(answer: StudyOfRuns) -> list[tuple[str, str]]:
-    """Return, each only once, why the pairs of the runs are no better and how to improve them."""
+    """Return, each only once, why the pairs of the runs are no better and how to improve them.
+
+    The reasons for "use" are among them if the vibration error is large, but small beside the next contact.
+    """
     causes = Counter(
         (row.verdict, row.verdict_reason, row.cure)
         for row in answer.runs
-        if row.cure and row.verdict
+        if row.verdict and (row.cure or _has_large_error(row))
     )
     return [
         (
             "why",
-            f"{verdict} in {format_number_of_runs(count)}: {reason}. To improve: {cure}",
+            f"{verdict} in {format_number_of_runs(count)}: {reason}{f'. To improve: {cure}' if cure else ''}",
         )
         for (verdict, reason, cure), count in causes.most_common(_MOST_REASONS)
     ]
 
 
+def _has_large_error(row: StudyRow) -> bool:
+    """Return True if the residual of a run is too large for a pair that preserves the vibration well."""
+    return row.residual is not None and grade_residual(row.residual) != GOOD
+
+
 def list_next_step(
     answer: StudyOfRuns, question: RepeatedQuestion
 ) -> list[tuple[str, str]]:
-    """Return the next command: to one td for all runs, to the verdict on the common pair, or to the worst run."""
+    """Return the next command: to one td for all runs, to the verdict on the common pair, or to the worst run.
+
+    If every run has a usable pair but no tr is common to all of them, each run can have its own tr.
+    """
     judged = [row for row in answer.runs if row.verdict and row.td is not None]
     if not judged:
         first = RepeatedQuestion(files=question.files[:1])
         return [("next", f"look at the first run with {write_command(first, 'info')}")]
     worst = min(judged, key=lambda row: GRADES.index(row.quality or POOR))
     of_worst = question._replace(files=(worst.source,))
-    if worst.quality == POOR or answer.common.tr is None:
+    if worst.quality == POOR:
         line = write_command(of_worst, "suggest", *question.times)
         step = f"look at the first of the worst runs with {line}"
+    elif len(judged) == 1:
+        line = write_command(of_worst, "suggest", *question.times)
+        step = f"print the cards of the run that was judged as {line} says"
+    elif answer.common.tr is None and answer.td is not None:
+        line = write_command(of_worst, "suggest", *question.times)
+        step = f"give each run its own tr, which its cards contain; for the first, see {line}"
     elif answer.td is None:
         earliest = min(row.td for row in judged if row.td is not None)
         readable = tuple(row.source for row in answer.runs if row.judged)

@@ -20,6 +20,7 @@ from d2rpick.choice.pair.grades import (
 from d2rpick.choice.pair.quality import (
     CHOOSE_TIMES_IN_FLIGHT,
     MOST_WORTH_OF_FAIR,
+    MOST_WORTH_OF_GOOD,
     grade_pair,
 )
 from d2rpick.vibration.measures import wrong_sign
@@ -300,7 +301,12 @@ def _explain_raised_grade(quality: Quality) -> str:
         return ""
     share = quality.worth.share
     advice = ": use only the motion" if quality.alone.grade == POOR else ""
-    return f", but the energy of this error is at most {share:.2%} of the energy of the next contact{advice}"
+    limit = (
+        MOST_WORTH_OF_GOOD if quality.vibration.grade == GOOD else MOST_WORTH_OF_FAIR
+    )
+    compared = f"at most {share:.2%} of the energy of the next contact"
+    allowed = f"limit for {VERDICTS[quality.vibration.grade]}: {limit:.0%}"
+    return f", but the energy of this error is {compared} ({allowed}){advice}"
 
 
 def format_bounds(bounds: MeanEnergyBounds) -> str:
