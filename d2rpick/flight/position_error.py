@@ -366,7 +366,7 @@ class Bodies:
     """Rigid bodies in a flight with their displacements; a single body is assumed if the deck defines none (``told``).
 
     If one displacement is unknown the error is unknown too, since it may be the largest.  ``apart`` are parts that are
-    to become one body with others but fly away from them.
+    to become one body with others but fly away from them, and ``staying`` the other moving parts, if any are apart.
     """
 
     def __init__(
@@ -374,8 +374,10 @@ class Bodies:
         drifts: Sequence[Drift | None],
         told: Sequence[RigidBody] | None,
         apart: Sequence[Part] = (),
+        staying: Sequence[Part] = (),
     ) -> None:
         self.told, self.apart = tuple(told or ()), tuple(apart)
+        self.staying = tuple(staying)
         self._known = tuple(drift for drift in drifts if drift)
         self._complete = len(self._known) == len(drifts) > 0
         self.unknown = tuple(
@@ -473,6 +475,7 @@ def find_bodies_in_flight(
             ],
             None,
             away,
+            _list_other_moving_parts(history, flight, away),
         )
     parts = [
         [part for part in history.parts or () if part.id in body.parts] for body in told
@@ -484,7 +487,20 @@ def find_bodies_in_flight(
         else _find_drift_of_body(history, flight, body, body_parts, placement)
         for body, body_parts, has_leaving in zip(told, parts, leaving, strict=True)
     ]
-    return Bodies(drifts, told, sum(leaving, ()))
+    away = sum(leaving, ())
+    staying = _list_other_moving_parts(history, flight, away)
+    return Bodies(drifts, told, away, staying)
+
+
+def _list_other_moving_parts(
+    history: History, flight: Flight, away: Sequence[Part]
+) -> tuple[Part, ...]:
+    """Return the moving parts to be switched other than those that fly ``away``; empty if none flies away."""
+    flying = _collect_flying(history, flight, None) if away else None
+    if flying is None or flying.momenta.parts is None:
+        return ()
+    parts = [flying.momenta.parts[i] for i in flying.members if flying.masses[i] > 0]
+    return tuple(part for part in parts if part not in away)
 
 
 def _find_drift_of_body(

@@ -10,6 +10,7 @@ from d2rpick.report.tables import make_positional, quote_shell_line
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from d2rpick.choice.answers import PairSuggestion
     from d2rpick.choice.pair.candidates import Pair
     from d2rpick.choice.pair.decision import Decision
     from d2rpick.choice.pair.situation import Situation
@@ -24,6 +25,10 @@ _SOME_NODE: Final = "1001"
 # Placeholders for the main deck in a command if the user has to name it, and for the folder of its copy.
 _SOME_DECK: Final = "DECK"
 _FOLDER: Final = "switched"
+# Word for the parts that fly together, as in `d2rpick.flight.momentum`, which is slow to import.
+_FLYING: Final = "flying"
+# Statement of the last step, when the pairs of all flights have been compared.
+_NO_PAIR: Final = "no pair of this run can be used"
 # Reason why the card of several parts needs the main deck.
 _NEEDS_DECK: Final = (
     f" (main deck of the run instead of {_SOME_DECK}; "
@@ -83,7 +88,7 @@ def name_step_to_card(
     is_chosen = question.parts or "--energy" in question.options
     if flying and not is_chosen and not is_radioss:
         again = "verify" if command == "card" else command
-        line = write_command(question, again, *question.times, new_parts=["flying"])
+        line = write_command(question, again, *question.times, new_parts=[_FLYING])
         return f"choose the parts to switch, for example those that fly, with {line}"
     # Only `card` accepts parts that the history does not contain.
     if command != "card" and (history.parts or is_radioss):
@@ -150,6 +155,36 @@ def _keep_td(times: Sequence[str]) -> Sequence[str]:
     return ()
 
 
+def _name_step_to_better_record(decision: Decision, question: RepeatedQuestion) -> str:
+    """Return the step after a pair that the record cannot support: the deck of the run, or a change of the record."""
+    if decision.needs_deck:
+        words = (*_keep_td(question.times), "--deck", _SOME_DECK)
+        line = write_command(_allow_deck(question), "suggest", *words)
+        return f"judge the run with its deck: {line} (main deck of the run instead of {_SOME_DECK})"
+    return f"improve the record: {decision.cure}; no pair of it can be used before"
+
+
+def name_way_out_of_run(answer: PairSuggestion, question: RepeatedQuestion) -> str:
+    """Return the step after a comparison of all flights in which no pair can be used.
+
+    It leads to other parts or to a change of the input, never to another comparison of the same pairs.
+    """
+    situation = answer.situation
+    is_chosen = question.parts or "--energy" in question.options
+    if situation.flight.by_parts and not is_chosen:
+        line = write_command(question, "plan", new_parts=[_FLYING])
+        return (
+            f"{_NO_PAIR} with all parts; judge the parts that fly together with {line}"
+        )
+    cure = answer.decision.cure_without_other_times if answer.decision else ""
+    if cure:
+        return f"{_NO_PAIR}: {cure}"
+    if situation.history.parts:
+        line = write_command(question._replace(parts=()), "parts")
+        return f"{_NO_PAIR} with these parts; find other parts with {line}"
+    return f"{_NO_PAIR}: run it without switching, or make other parts rigid"
+
+
 def name_step_after_refusal(
     situation: Situation,
     better: Pair | None,
@@ -157,13 +192,15 @@ def name_step_after_refusal(
     otherwise: str,
     decision: Decision | None = None,
 ) -> str:
-    """Return the next step after an unusable pair: judge a better pair or more parts; if there are none, ``otherwise``.
+    """Return the step after a pair that cannot be used: to a better pair, to other parts, or ``otherwise``.
 
     If the ``decision`` shows that every pair of the record is unusable, the next step is to improve the record.
     """
+    if decision is not None and decision.better_parts:
+        line = write_command(question, "plan", new_parts=decision.better_parts)
+        return f"make other parts rigid; judge them with {line}"
     if decision is not None and decision.needs_better_record:
-        line = write_command(question, "suggest", *_keep_td(question.times))
-        return f"improve the record as said above, then judge it again with {line}"
+        return _name_step_to_better_record(decision, question)
     if decision is not None and decision.is_outside_flight and better is None:
         line = write_command(question, "suggest")
         return f"choose both times in the flight with {line}"

@@ -26,6 +26,7 @@ from d2rpick.report.next_step import (
     name_step_after_refusal,
     name_step_to_card,
     name_step_to_deck,
+    name_way_out_of_run,
     needs_deck,
     write_command,
 )
@@ -349,16 +350,23 @@ def _list_step_without_window(
             line = write_command(question, "info")
             look = f"see with {line} what the run has to write"
             return [("next", f"{look}, or give the end of the load as --after")]
-        line = write_command(question, "explore")
-        return [("next", f"compare all td of the longest flight with {line}")]
+        return [("next", _name_step_if_flights_are_short(question))]
     answer = max(rows, key=lambda row: row.end - row.start).answer
     assert answer is not None
     better = answer.decision.better if answer.decision else None
-    otherwise = f"compare all td with {write_command(question, 'explore')}"
+    otherwise = name_way_out_of_run(answer, question)
     step = name_step_after_refusal(
         answer.situation, better, question, otherwise, answer.decision
     )
     return [("next", step)]
+
+
+def _name_step_if_flights_are_short(question: RepeatedQuestion) -> str:
+    """Return the step if no flight leaves the shortest rigid time: a shorter one or, if it was given, no switching."""
+    if "--min-rigid" in question.times:
+        return "no pair of this run can be used: every flight is too short to switch parts in it"
+    line = write_command(question, "plan", *question.times, "--min-rigid", "0")
+    return f"plan shorter windows too with {line}"
 
 
 def list_verdicts(plan: RunPlan) -> list[tuple[str, str]]:

@@ -5,6 +5,7 @@ from html import unescape
 import pytest
 
 import d2rpick as d2
+from d2rpick.choice.pair.aftermath import MeanEnergyBounds
 from d2rpick.choice.pair.grades import DO_NOT_USE, GRADES, VERDICTS
 from tests.command import ENERGY, GLSTAT, MATSUM, ROOT, run_json
 from tests.energies import require
@@ -35,6 +36,34 @@ def test_all_commands_give_one_verdict_on_a_pair(
     answers = [planned, chosen, judged, offer, row]
     assert {answer_row["verdict"] for answer_row in answers} == {planned["verdict"]}
     assert len({answer_row["verdict_reason"] for answer_row in answers}) == 1
+
+
+@pytest.mark.parametrize(
+    ("bounds", "says"),
+    [
+        ((0.33, 0.34), "it will refuse that run by its mean energy; to accept it"),
+        ((1.4, 7.1), "it will refuse that run by its mean energy)"),
+        ((0.58, 7.1), "(d2rpick verify accepts 70% to 130% of a switched run)"),
+        ((0.8, 1.2), "mean energy after td 80% to 120% of the reference run"),
+    ],
+)
+def test_a_pair_that_verify_will_refuse_by_its_mean_energy_says_so(
+    bounds: tuple[float, float], says: str
+) -> None:
+    """Only the motion of such a pair is used, but a comparison with its switched run fails without another limit."""
+    decision = require(d2.suggest(d2.read(ENERGY), 0.0687534).decision)
+    expected = decision._replace(mean_energy_bounds=MeanEnergyBounds(*bounds)).expected
+    assert says in expected
+    assert ("refuse" in expected) == ("refuse" in says)
+    assert ("`min_mean_energy` to 0.33" in expected) == (bounds == (0.33, 0.34))
+
+
+def test_a_better_pair_without_a_residual_is_named_with_its_gain() -> None:
+    decision = require(d2.suggest(d2.read(ENERGY), 0.064).decision)
+    better = require(decision.better)._replace(residual=None)
+    named = decision._replace(better=better, better_level=1.09)
+    assert "the energy at td is 1.09 times as high" in named.cure
+    assert "times as high" not in named._replace(better_level=None).cure
 
 
 @pytest.mark.parametrize("td", [0.05, 0.06, 0.064, 0.0687534, 0.0698, 0.075])

@@ -9,6 +9,7 @@ import pytest
 
 import d2rpick as d2
 from d2rpick.base.errors import FormatError
+from d2rpick.choice.pair.moving_apart import MovingApart
 from d2rpick.choice.parts.cost import CostModel, Weights
 from d2rpick.choice.parts.sets_of_parts import (
     Parts,
@@ -27,6 +28,7 @@ from d2rpick.choice.parts.switchable_parts import (
 from d2rpick.choice.question import Settings
 from d2rpick.deck import read_inventory
 from d2rpick.histories.formats import radioss_th
+from d2rpick.histories.names import Part
 from d2rpick.histories.opening import open_run
 from d2rpick.report.formats import DisplayOptions
 from d2rpick.vibration.measures import run_time_share
@@ -603,6 +605,38 @@ def test_without_a_deck_parts_that_fly_away_are_no_body(folder: Path) -> None:
         str(folder / "v.html"),
     )
     assert list_messages(joined, "moves-apart") == [message]
+
+
+@pytest.mark.parametrize("selected", [(), ("--part", "1-9")])
+def test_parts_that_fly_away_are_not_switched_with_the_others(
+    folder: Path, selected: tuple[str, ...]
+) -> None:
+    """One rigid body of the car and its loose wheels would move like none of them, so the motion is poor."""
+    history, instead = str(folder / "MADET01"), "1,2,3,4,5,6"
+    arguments = ("suggest", "--td", "0.05", *selected, history)
+    document = run_json(*arguments)
+    assert document["verdict"] == "do not use"
+    assert document["motion"] == "poor"
+    (message,) = list_messages(document, "moves-apart")
+    assert "fly away from the other parts" in message
+    assert document["cure"].startswith("leave these parts out")
+    text = " ".join(run(*arguments).stdout.split())
+    assert f"judge them with d2rpick plan --part {instead} {history}" in text
+    chosen = run_json("suggest", "--td", "0.05", "--part", instead, history)
+    assert chosen["motion"] != "poor"
+
+
+def test_parts_that_all_fly_on_their_own_are_not_to_be_left_out() -> None:
+    """Each may be a rigid body of its own, in the flight that was found; nothing else could be switched instead."""
+    parts = (Part(1, "bottom"), Part(2, "top"))
+    separate = MovingApart(leaving=parts, staying=(), are_joined=False)
+    assert separate.are_all_separate
+    assert separate.describe().startswith("bottom, top fly away from each other: ")
+    assert separate.advice.startswith(
+        "make each of these parts a rigid body of its own"
+    )
+    joined = separate._replace(are_joined=True)
+    assert not joined.are_all_separate
 
 
 @pytest.mark.slow

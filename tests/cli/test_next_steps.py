@@ -18,6 +18,7 @@ from tests.command import (
     run,
     run_json,
 )
+from tests.computed import locate_stored
 
 SAMPLES = ROOT / "sample_data"
 DECK = str(SAMPLES / "rollover_box.k")
@@ -318,10 +319,10 @@ def test_a_missing_mass_is_named_and_no_deck_is_asked_for(
     cure = find_line("to improve", *question)
     assert cure.startswith("write the mass")
     assert "--deck" not in cure
-    # The other commands have the same verdict, so the step leads to a better record instead of back to the answer.
+    # All commands have the same verdict, so the step names the change of the record, and no command.
     step = find_line("next", *question)
-    assert step.startswith("improve the record")
-    assert step.endswith(shlex.join(["suggest", "--td", "369.631", *options, EXCEL]))
+    assert step.startswith("improve the record: write the mass")
+    assert "d2rpick" not in step
 
 
 def test_the_mass_that_was_asked_for_helps(tmp_path: Path) -> None:
@@ -332,14 +333,94 @@ def test_the_mass_that_was_asked_for_helps(tmp_path: Path) -> None:
     assert run_json("suggest", str(table))["verdict"] == "use with care"
 
 
-def test_the_step_to_a_better_record_keeps_a_window_for_td() -> None:
-    question = ("suggest", "--td-window", "340.5", "370.5", EXCEL)
-    assert find_line("next", *question).endswith(shlex.join(question))
+@pytest.fixture(scope="module")
+def loaded(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """Write a vibration with a kinetic energy that grows without a contact, by a load that no file names."""
+    head, *rows = Path(ENERGY).read_text().splitlines()
+    internal = head.split(",").index("internal_energy")
+    lines = ["time,internal_energy,kinetic_energy"]
+    for row in rows:
+        columns = row.split(",")
+        kinetic = 1000 + 20000 * float(columns[0])
+        lines.append(f"{columns[0]},{columns[internal]},{kinetic!r}")
+    table = tmp_path_factory.mktemp("load") / "loaded.csv"
+    table.write_text("\n".join(lines))
+    return str(table)
+
+
+@pytest.mark.parametrize("command", ["suggest", "plan"])
+def test_a_deck_that_may_explain_a_load_is_asked_for_in_a_new_command(
+    command: str, loaded: str
+) -> None:
+    step = find_line("next", command, loaded)
+    again = shlex.join(["suggest", "--deck", "DECK", loaded])
+    assert step.startswith(f"judge the run with its deck: d2rpick {again} (")
+
+
+def test_the_step_to_the_deck_keeps_a_window_for_td(loaded: str) -> None:
+    step = find_line("next", "suggest", "--td-window", "0.12", "0.15", loaded)
+    assert "suggest --td-window 0.12 0.15 --deck DECK" in step
+
+
+def list_followed_commands(*first: str) -> list[list[str]]:
+    """Type the command that each answer names next, until one names none or asks for a deck; stop at a repetition."""
+    commands = [list(first)]
+    while len(commands) < 10 and commands.count(commands[-1]) == 1:
+        step = find_line("next", *commands[-1])
+        match = re.search(r"d2rpick (\w+ .*?)(?: \(.*)?$", step)
+        if match is None or "DECK" in step:
+            break
+        commands.append(shlex.split(match[1]))
+    return commands
+
+
+@pytest.mark.parametrize(
+    "history",
+    [
+        EXCEL,
+        pytest.param(locate_stored("carT01.gz"), marks=pytest.mark.slow),
+    ],
+)
+@pytest.mark.parametrize("command", ["suggest", "explore", "plan"])
+def test_the_next_commands_of_a_run_that_cannot_be_used_end(
+    command: str, history: str
+) -> None:
+    commands = list_followed_commands(command, history)
+    assert len({*map(shlex.join, commands)}) == len(commands)
+
+
+def test_the_next_commands_of_a_run_under_a_load_end(loaded: str) -> None:
+    assert list_followed_commands("explore", loaded) == [["explore", loaded]]
+    margin = ("--margin", "0.13")
+    followed = list_followed_commands("explore", *margin, ENERGY)
+    assert [command[0] for command in followed] == ["explore", "plan"]
+
+
+@pytest.mark.slow
+def test_a_plan_that_finds_no_pair_says_so_and_names_a_way_out() -> None:
+    history = locate_stored("carT01.gz")
+    step = find_line("next", "plan", history)
+    assert step.startswith("no pair of this run can be used with all parts; ")
+    assert step.endswith(f"d2rpick plan --part flying {history}")
+    last = find_line("next", "plan", "--part", "flying", history)
+    assert last.startswith("no pair of this run can be used: write the energies more")
+    assert "d2rpick" not in last
+
+
+def test_a_plan_of_short_flights_asks_for_shorter_windows_only_once() -> None:
+    given = ("--after", "0.01", "--landing", "0.012")
+    shorter = ("plan", "--min-rigid", "0", *given, ENERGY)
+    step = find_line("next", "plan", *given, ENERGY)
+    assert step == f"plan shorter windows too with d2rpick {shlex.join(shorter)}"
+    assert "plan" not in find_line("next", *shorter)
+    last = find_line("next", "plan", "--min-rigid", "0.002", *given, ENERGY)
+    assert last.startswith("no pair of this run can be used: every flight is too short")
 
 
 def test_the_step_of_a_plan_without_a_mass_is_not_another_tour() -> None:
-    text = run("plan", EXCEL).stdout
-    assert "next  improve the record as said above" in text
+    step = find_line("next", "plan", EXCEL)
+    assert step.startswith("improve the record: write the mass")
+    assert "d2rpick" not in step
 
 
 # verify names the time that is to blame.

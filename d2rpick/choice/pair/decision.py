@@ -5,6 +5,7 @@ All commands, output forms and pages use the texts of this module, so that they 
 
 from __future__ import annotations
 
+from math import floor
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.tuples import NamedTuple
@@ -73,6 +74,8 @@ class Decision(NamedTuple):
         Largest residual that the record allows [-].
     better : Pair or None
         A better pair, if one was requested and found.
+    better_level : float or None
+        Energy level at td of the better pair, relative to that of this pair [-]; None if it was not compared.
     cure_of_objections : str
         What to do about the objections if there is no better pair.
     best_of : (float, float) or None
@@ -89,6 +92,7 @@ class Decision(NamedTuple):
     residual: float | None
     worst_residual: float
     better: Pair | None = None
+    better_level: float | None = None
     cure_of_objections: str = CHOOSE_ANOTHER
     best_of: tuple[float, float] | None = None
     is_compared: bool = False
@@ -103,6 +107,23 @@ class Decision(NamedTuple):
         """True if the pair cannot be used for a reason that applies to every pair of the record."""
         causes = self.quality.causes
         return self.grade == POOR and any(cause.is_of_record for cause in causes)
+
+    @property
+    def needs_deck(self) -> bool:
+        """True if the pair cannot be used because of a load that the deck of the run would explain."""
+        return self.needs_better_record and any(
+            cause.needs_deck for cause in self.quality.causes
+        )
+
+    @property
+    def better_parts(self) -> tuple[str, ...]:
+        """Values of `parts` with which a reason against the pair does not apply; empty if no other parts are known."""
+        if self.grade != POOR:
+            return ()
+        return next(
+            (cause.better_parts for cause in self.quality.causes if cause.better_parts),
+            (),
+        )
 
     @property
     def is_outside_flight(self) -> bool:
@@ -180,7 +201,17 @@ class Decision(NamedTuple):
         low, high = self.mean_energy_bounds
         if limits.low <= low and high <= limits.high:
             return ""
-        return f" (d2rpick verify accepts {format_bounds(limits)} of a switched run)"
+        accepted = f"d2rpick verify accepts {format_bounds(limits)} of a switched run"
+        if high < limits.low:
+            # The limit is rounded down to a whole per cent, so that it accepts the lower bound.
+            lowest = floor(100 * low) / 100
+            return (
+                f" ({accepted}, so it will refuse that run by its mean energy; to accept it because only the motion "
+                f"is used, set `min_mean_energy` to {lowest:g})"
+            )
+        if low > limits.high:
+            return f" ({accepted}, so it will refuse that run by its mean energy)"
+        return f" ({accepted})"
 
     @property
     def worst_case(self) -> str:
@@ -201,18 +232,20 @@ class Decision(NamedTuple):
             return ""
         if self.needs_better_record:
             # A better pair of the same record cannot be used either.
-            return join_cures(
-                cause.cure
-                for cause in self.quality.causes
-                if not cause.needs_other_times
-            )
+            return self.cure_without_other_times
         if self.better is not None:
-            return f"use {_describe_pair(self.better)}"
+            return f"use {_describe_pair(self.better, self.better_level)}"
         if self.is_outside_flight and not self.is_compared:
             return CHOOSE_TIMES_IN_FLIGHT
         if self.objections or not self.quality.causes:
             return self.cure_of_objections
         return join_cures(map(self.specify_cure, self.quality.causes))
+
+    @property
+    def cure_without_other_times(self) -> str:
+        """The changes other than that of tr or td that would make the pair better; empty if there are none."""
+        causes = self.quality.causes
+        return join_cures(cause.cure for cause in causes if not cause.needs_other_times)
 
     def specify_cure(self, cause: Cause) -> str:
         """Return the advice on a cause of the verdict; do not suggest other times for the best pair in a td range."""
@@ -268,6 +301,7 @@ def decide(
         residual=candidate.residual,
         worst_residual=_find_worst_residual(situation, candidate),
         better=better,
+        better_level=_compare_levels(situation, better),
         cure_of_objections=cure_of_objections,
         best_of=best_of,
     )
@@ -315,9 +349,18 @@ def format_bounds(bounds: MeanEnergyBounds) -> str:
     return low if low == high else f"{low} to {high}"
 
 
-def _describe_pair(pair: Pair) -> str:
-    """Describe a pair by its times and, if known, by its residual."""
+def _compare_levels(situation: Situation, better: Pair | None) -> float | None:
+    """Return the energy level at td of a better pair, relative to that of the situation [-]; None if it is unknown."""
+    if better is None or not situation.energy_td > 0:
+        return None
+    return situation.vibration.whole.energy(better.td) / situation.energy_td
+
+
+def _describe_pair(pair: Pair, level: float | None) -> str:
+    """Describe a pair by its times and its residual or, if that is unknown, by its higher ``level`` at td [-]."""
     times = f"tr = {pair.tr:.6g}, td = {pair.td:.6g}"
+    if pair.residual is None and level is not None and level > 1:
+        return f"{times}: the energy at td is {level:.3g} times as high, so more of the vibration can be kept"
     if pair.residual is None:
         return times
     return f"{times}: vibration wrong by {format_residual(pair.residual)}"

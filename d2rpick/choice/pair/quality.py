@@ -13,6 +13,7 @@ from d2rpick.base.tuples import NamedTuple
 from d2rpick.choice.pair.aftermath import compare_error_with_contact
 from d2rpick.choice.pair.candidates import Candidates, judge_candidates
 from d2rpick.choice.pair.grades import FAIR, GOOD, GRADES, POOR, format_residual
+from d2rpick.choice.pair.moving_apart import find_parts_moving_apart
 from d2rpick.choice.pair.warnings import (
     POOR_KINETIC_SHARE,
     POOR_RESIDUAL,
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
 
     from d2rpick.choice.pair.aftermath import Worth
     from d2rpick.choice.pair.candidates import Candidate, Judged
+    from d2rpick.choice.pair.moving_apart import MovingApart
     from d2rpick.choice.pair.situation import Situation
     from d2rpick.flight.flight import Flight
     from d2rpick.histories.history import History, Samples
@@ -249,8 +251,10 @@ class Cause(NamedTuple):
     """The ``reason`` why a grade is not better, and the ``cure`` that would improve the grade.
 
     ``needs_other_times``: the cure is another tr or td.  ``is_of_record``: the cause holds for each pair of the record,
-    so other times do not help before the record or the deck is improved.  ``kind`` is the reason without the numbers
-    of this pair, by default the reason itself; with it a table explains once what several pairs have in common.
+    so other times do not help before the record or the deck is improved, or other parts are chosen.  ``kind`` is the
+    reason without the numbers of this pair, by default the reason itself; with it a table explains once what several
+    pairs have in common.  ``better_parts`` are values of `parts` with which the cause does not apply.  ``needs_deck``:
+    the deck of the run may remove the cause.
     """
 
     reason: str
@@ -258,6 +262,8 @@ class Cause(NamedTuple):
     needs_other_times: bool = False
     kind: str = ""
     is_of_record: bool = False
+    better_parts: tuple[str, ...] = ()
+    needs_deck: bool = False
 
     @property
     def general_reason(self) -> str:
@@ -284,10 +290,11 @@ _UNKNOWN_LOAD: Final = Cause(
     "gravity or another load changes momentum or energy in the flight",
     "give the deck of the run as `deck`, because it defines gravity and loads, or write the part momenta",
     is_of_record=True,
+    needs_deck=True,
 )
 # The cause if the user gave the deck, but its loads do not explain the change of momentum or energy.
 _UNKNOWN_LOAD_WITH_DECK: Final = _UNKNOWN_LOAD._replace(
-    cure="write the part momenta (LS-DYNA matsum, Radioss /TH/PART)"
+    cure="write the part momenta (LS-DYNA matsum, Radioss /TH/PART)", needs_deck=False
 )
 
 
@@ -376,6 +383,17 @@ def _explain_unknown_load(situation: Situation) -> Cause:
     return _UNKNOWN_LOAD if history.surroundings is UNKNOWN else _UNKNOWN_LOAD_WITH_DECK
 
 
+def _explain_moving_apart(moving_apart: MovingApart) -> Cause:
+    """Return why parts that fly away from each other are no rigid body, and which parts are one."""
+    return Cause(
+        moving_apart.describe(),
+        moving_apart.advice,
+        kind="some of the parts fly away from the others",
+        is_of_record=True,
+        better_parts=tuple(str(part.id) for part in moving_apart.staying),
+    )
+
+
 def grade_pair(
     situation: Situation, best: Candidate, best_residual: float | None = None
 ) -> Quality:
@@ -395,7 +413,12 @@ def grade_pair(
     ]
     if flight.unknown_load:
         ruined.append(_explain_unknown_load(situation))
-    motion = Grade.of(ruined, uncertain)
+    moving_apart = find_parts_moving_apart(situation)
+    separate: list[Cause] = []
+    if moving_apart is not None:
+        cause = _explain_moving_apart(moving_apart)
+        (separate if moving_apart.are_all_separate else ruined).append(cause)
+    motion = Grade.of(ruined, (*uncertain, *separate))
     if situation.at_rest:
         return Quality(motion, Grade("good"), Grade("good"))
     alone = Grade.of(

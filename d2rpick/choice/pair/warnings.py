@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from d2rpick.base.errors import Caution, list_names, name_units
+from d2rpick.base.errors import Caution, name_units
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.choice.pair.few_states import warn_about_few_states
+from d2rpick.choice.pair.moving_apart import find_parts_moving_apart
 from d2rpick.choice.parts.margins import compute_turning_speed
 from d2rpick.flight.internal_energy import round_off
 from d2rpick.flight.margin import compute_margin
@@ -33,7 +34,6 @@ if TYPE_CHECKING:
     from d2rpick.choice.pair.situation import Situation
     from d2rpick.flight.position_error import RigidBody
     from d2rpick.histories.history import Samples
-    from d2rpick.histories.names import Part
     from d2rpick.vibration.measures import Columns
 
 # Modes of higher frequency are detected only if each energy period has at least this number of states.
@@ -248,8 +248,11 @@ def warn_about_place(situation: Situation, tr: float) -> Iterator[Caution]:
         yield Caution(
             "several-bodies", _describe_not_predicted(bodies.told, bodies.unknown)
         )
-    if bodies.apart:
-        yield Caution("moves-apart", _describe_moving_apart(bodies.apart))
+    moving_apart = find_parts_moving_apart(situation)
+    if moving_apart is not None:
+        yield Caution(
+            "moves-apart", f"{moving_apart.describe()}; {moving_apart.advice}"
+        )
     worst = bodies.worst(tr, situation.td)
     if worst is None or worst.error <= bodies.limit:
         return
@@ -278,18 +281,6 @@ def warn_about_place(situation: Situation, tr: float) -> Iterator[Caution]:
     yield Caution(
         "out-of-place",
         f"{frozen}: {distance}{moved if situation.flight.end is not None else ''}{assumption}",
-    )
-
-
-def _describe_moving_apart(parts: Sequence[Part]) -> str:
-    """Describe the parts that move away from the others because they are not connected to them."""
-    verb = "flies" if len(parts) == 1 else "fly"
-    away = (
-        f"{list_names([part.name for part in parts])} {verb} away from the other parts"
-    )
-    return (
-        f"{away}: nothing connects them, and one rigid body of all would move like none of them; leave "
-        "these parts out"
     )
 
 
