@@ -41,7 +41,7 @@ def describe_expectation(decision: Decision) -> str:
 
 
 def list_statements(decision: Decision) -> Lines:
-    """Return a sentence on the motion and one on the vibration, without what the verdict already states."""
+    """Return a sentence on the motion and a sentence on the vibration; omit what the verdict already states."""
     motion = decision.quality.motion
     vibration = decision.quality.vibration
     alone = decision.quality.alone
@@ -73,7 +73,7 @@ def explain_grade(grade: Grade, decision: Decision) -> str:
     if not causes:
         return ""
     reasons = "; ".join(cause.reason for cause in causes)
-    # A better pair is a cure that the verdict already mentions.
+    # Causes that a better pair removes are omitted, because the verdict already names this pair.
     curable = [
         cause
         for cause in causes

@@ -204,7 +204,8 @@ DOCUMENT: Final = Document(
         Field(
             "fewest_cycles",
             "integer?",
-            "fewest time steps of the written run, if one largest step holds throughout, as with sensors; else null",
+            "smallest number of time steps of the written run, if the same maximum time step applies to the whole run, "
+            "as with sensors; otherwise null",
         ),
     ),
 )
@@ -266,7 +267,7 @@ def give_plan_sentence(plan: RunPlan) -> str:
 
 
 def _describe_use(plan: RunPlan) -> str:
-    """Describe how many windows can be used now, how many only with care, and how many planned windows not at all."""
+    """Describe how many windows can be used now, how many only with care, and how many cannot be used."""
     decisions = [(row.number, row.decision) for row in plan.supported if row.decision]
     if len(decisions) == 1:
         number, decision = decisions[0]

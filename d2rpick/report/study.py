@@ -90,41 +90,42 @@ _SHARED: Final = row(
     Field("td", "number?", "given td; null if each run has its own td"),
     Field("td_window", "span?", "range in which each run chose its td"),
     Field("tr", row(*(Field(key, "number?") for key in ("min", "median", "max"))),
-          "Statistics of tr, for the runs that have one.",
+          "statistics of tr, for the runs that have a tr",
           lambda answer: answer.spread or dict.fromkeys(("min", "median", "max"))),
-    Field("agree", "flag?", "True if the intervals from tr_low to tr_high of these runs have a time in common."),
+    Field("agree", "flag?", "true if the intervals from tr_low to tr_high of these runs overlap"),
     Field("common_tr", "number?",
-          "The tr of all runs if they agree. Otherwise the earliest tr that is admissible in every run with status ok "
-          "or none, and within the timing tolerance of each, if there is one.", lambda answer: answer.common.tr),
+          "median of tr, or the time nearest to it within all intervals, if the runs agree. Otherwise the earliest tr "
+          "that is admissible in every run with status ok or none, and within the timing tolerance of each, if there "
+          "is such a tr", lambda answer: answer.common.tr),
     Field("common_verdict", maybe(keys.VERDICT),
-          "What to do with common_tr: the verdict for the worst run, from its own pair and from its error at "
-          "common_tr.",
+          "what to do with common_tr: the verdict for the worst run, from its own pair and from its error at "
+          "common_tr",
           lambda answer: VERDICTS.get(answer.grade), later=True),
-    Field("common_window", "span?", "First and last tr around common_tr that meet the same conditions.",
+    Field("common_window", "span?", "first and last tr around common_tr that meet the same conditions",
           lambda answer: answer.common.window),
-    Field("common_reason", "text?", "Why there is no common_tr.", lambda answer: answer.common.reason),
+    Field("common_reason", "text?", "reason why there is no common_tr", lambda answer: answer.common.reason),
     Field("common_keeps_timing_tolerance", "flag?",
-          "True if no error at common_tr is more than 0.05 larger than the error at the run's own tr; null if there "
-          "is no common_tr.",
+          "true if no error at common_tr is more than 0.05 larger than the error at the run's own tr; null if there "
+          "is no common_tr",
           lambda answer: answer.common.keeps_tolerance),
-    Field("common_errors", many("number?"), "Errors of the runs at common_tr, in the same order; empty if there is no "
-                                            "common_tr.",
+    Field("common_errors", many("number?"), "errors of the runs at common_tr, in the same order; empty if there is no "
+                                            "common_tr",
           lambda answer: answer.common.errors),
 )  # fmt: skip
 _RUNS: Final = Field("runs", many(RUN), get=lambda answer: list(add_errors(answer)))
 _MEANING: Final = (
-    "Answer of d2rpick study; times in the unit of the histories. With -f ndjson each run is a line by $defs/line, the "
-    "last line is by $defs/last."
+    "Answer of d2rpick study; times in the unit of the histories. With -f ndjson each run is a line that follows "
+    "$defs/line; the last line follows $defs/last."
 )
 # Newline-delimited JSON has one line per run, written by `d2rpick.api.studies`, and a last line of common results.
 _CURVE: Final = get_kind(many(many("number")), minItems=2, maxItems=2)
 _LINE: Final = row(
     *RUN.fields,
     Field("acceptable", many(many("span")),
-          "Intervals of admissible tr, and those in which the error is at most 0.05 above that of tr."),
+          "intervals of admissible tr, and intervals in which the error is at most 0.05 above the error at tr"),
     Field("files", many(row(Field("name", "text"), Field("size", "integer"), Field("mtime_ns", "integer")))),
-    Field("asked", "text", "Stands for the options and the version."),
-    Field("curve", _CURVE, "Times and energies of an outline of the record, for a figure."),
+    Field("asked", "text", "hash of the options and the version"),
+    Field("curve", _CURVE, "times and energies of an outline of the record, for a figure"),
     Field("profile", maybe(_CURVE), "Times and errors of admissible tr, straight lines between them."),
     name="line", later=("common_error", "curve", "record_end"), **_JUDGED,
 )  # fmt: skip
@@ -288,7 +289,7 @@ def _describe_spread(spread: Spread, *, overlaps: bool) -> str:
 
 
 def _name_error(answer: StudyOfRuns) -> str:
-    """Return the name of the errors at the common tr, which depend on the basis of the runs."""
+    """Return the name of the errors at the common tr: residual, level error, or error if the runs have both."""
     bases = {row.basis for row in answer.runs if row.judged}
     if "energy" not in bases:
         return "residual"

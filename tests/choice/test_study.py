@@ -3,6 +3,7 @@
 import os
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -579,7 +580,12 @@ def test_the_error_at_the_common_tr_of_a_run_is_its_residual() -> None:
 
 
 def test_runs_that_need_their_own_tr_are_not_called_the_worst() -> None:
-    good = {"quality": "good", "verdict": "use", "verdict_reason": "kept", "cure": ""}
+    good: dict[str, Any] = {
+        "quality": "good",
+        "verdict": "use",
+        "verdict_reason": "kept",
+        "cure": "",
+    }
     rows = [make_study_row(name, (1, 2), **good) for name in ("a.csv", "b.csv")]
     rows[1] = make_study_row("b.csv", (3, 4), tr=3.5, **good)
     question = RepeatedQuestion(files=("a.csv", "b.csv"))

@@ -150,7 +150,7 @@ class Decision(NamedTuple):
 
     @property
     def is_limited_by_raised_grade(self) -> bool:
-        """True if the vibration grade decides the verdict after it was raised because of a negligible error."""
+        """True if the verdict rests on a vibration grade that was raised because the vibration error is negligible."""
         vibration = self.quality.vibration
         is_raised = self.quality.alone.grade != vibration.grade
         return is_raised and vibration.grade == self.grade
@@ -173,7 +173,7 @@ class Decision(NamedTuple):
         return ", ".join(parts) or "unknown: no model of the vibration fits the record"
 
     def _name_exceeded_limits(self) -> str:
-        """Name the limits of a comparison that a switched run with a usable pair may exceed; empty if it cannot."""
+        """Name the limits of ``verify`` that a switched run may exceed although its pair is usable; empty if none."""
         if self.grade == POOR or self.is_compared or self.mean_energy_bounds is None:
             return ""
         limits = MeanEnergyBounds(MIN_MEAN_ENERGY, 2 - MIN_MEAN_ENERGY)
@@ -215,7 +215,7 @@ class Decision(NamedTuple):
         return join_cures(map(self.specify_cure, self.quality.causes))
 
     def specify_cure(self, cause: Cause) -> str:
-        """Return the advice that removes a cause. If the pair is the best of a td range, no other times are advised."""
+        """Return the advice on a cause of the verdict; do not suggest other times for the best pair in a td range."""
         if self.best_of is None or not cause.needs_other_times:
             return cause.cure
         low, high = self.best_of

@@ -285,7 +285,7 @@ _UNKNOWN_LOAD: Final = Cause(
     "give the deck of the run as `deck`, because it defines gravity and loads, or write the part momenta",
     is_of_record=True,
 )
-# The cause if the deck was given and does not explain the change either.
+# The cause if the user gave the deck, but its loads do not explain the change of momentum or energy.
 _UNKNOWN_LOAD_WITH_DECK: Final = _UNKNOWN_LOAD._replace(
     cure="write the part momenta (LS-DYNA matsum, Radioss /TH/PART)"
 )
@@ -464,7 +464,7 @@ def _describe_unknown_direction(situation: Situation) -> Cause:
 
 
 def omit_comparison(quality: Quality) -> Quality:
-    """Return the grades without the advice to compare with a finished switched run, because that has been done."""
+    """Return the grades without the advice to compare with a switched run, for use after this comparison."""
 
     def omit(grade: Grade) -> Grade:
         causes = [
