@@ -79,6 +79,11 @@ def list_verdict_lines(
     if verdict != USE:
         cure = "repeat the runs, each alone on the machine, or give more runs"
         lines.append(("to improve", cure))
+    covered = [
+        name for name in calibration.weights.per_element if name not in _IN_WORDS
+    ]
+    others = "the saving of parts with any other formulation stays unknown with them"
+    lines.append(("covers", f"{list_names(covered)}; {others}"))
     line = write_command(question, "calibrate", "-f", "toml", "-o", _FILE)
     step = f"write the weights with {line}, then give plan or parts --weights {_FILE}"
     return [*lines, ("next", step)]

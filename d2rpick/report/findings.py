@@ -54,6 +54,9 @@ _NOUNS: Final = (
 # This pattern is compiled at its first use, to keep start-up fast.
 # Name of the switched run in a command if the user has to give it.
 _SOME_RUN: Final = "SWITCHED_RUN"
+# Rule that reports switches without a time, and the end of its message if nothing else gives their time.
+_UNTIMED_RULE: Final = "D2R302"
+_NOT_JUDGED: Final = "not judged by time"
 _NOT_XML: Final = "[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]"
 
 _LINE: Final = get_kind("integer", minimum=1)
@@ -133,6 +136,16 @@ def _switches_at_unknown_times(result: Checked) -> bool:
     return result.switches_itself and not result.windows
 
 
+def _has_only_untimed_cards(result: Checked) -> bool:
+    """Return True if no switching card of a deck has a time that can be compared with an energy history."""
+    untimed = {
+        (finding.file, finding.line)
+        for finding in result.findings
+        if finding.rule == _UNTIMED_RULE and finding.message.endswith(_NOT_JUDGED)
+    }
+    return len(untimed) >= result.cards
+
+
 def _name_next_step(checks: Checks) -> str:
     """Return what to do after the check, with a command that can be copied."""
     serious = [
@@ -155,6 +168,9 @@ def _name_next_step(checks: Checks) -> str:
         )
     if not any(result.cards for result in checks.results):
         return "if the run is to be switched, choose the times with d2rpick plan HISTORY, and add the cards to the deck"
+    if all(map(_has_only_untimed_cards, checks.results)):
+        explain = tables.quote_shell_line(("d2rpick", "rule", _UNTIMED_RULE))
+        return f"no card has a time that a history can judge; {explain} says how to have such switches judged"
     if checks.history is None:
         command = tables.quote_shell_line(("d2rpick", "check", *decks))
         return f"judge the times by the reference run: {command} --history HISTORY"

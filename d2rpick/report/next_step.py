@@ -235,6 +235,8 @@ def name_step_after_card(
     else:
         action, name = "add these cards to the main deck", "main deck"
     hint = "" if deck else f" ({name} instead of {_SOME_DECK})"
+    if worst is None:
+        action = f"these times were not judged, because no history was given; {action}"
     files = make_positional([deck or _SOME_DECK])
     line = quote_shell_line(("d2rpick", "check", *question.checking, *files))
     if is_separate:
@@ -245,7 +247,8 @@ def name_step_after_card(
 def name_step_after_extract(file: str) -> str:
     """Return the next step after an energy was extracted into a file."""
     line = quote_shell_line(("d2rpick", "suggest", *make_positional([file])))
-    return f"choose times with {line}"
+    advice = "print the cards from the run itself, because the table names neither its solver nor all its parts"
+    return f"choose times with {line}; {advice}"
 
 
 def name_step_after_first(folder: str) -> str:

@@ -235,7 +235,7 @@ def list_facts(overview: Overview) -> list[tuple[str, tables.Cell]]:
         ("shortest interval", sampling.min if sampling else None),
         ("median interval", sampling.median if sampling else None),
         ("longest interval", sampling.max if sampling else None),
-        ("complete", overview.complete),
+        ("complete", _describe_completeness(overview)),
         ("channels", ", ".join(overview.channels) or None),
     ]
     rows += [
@@ -244,6 +244,12 @@ def list_facts(overview: Overview) -> list[tuple[str, tables.Cell]]:
     if overview.should_write:
         rows.append(("should write", overview.should_write))
     return rows
+
+
+def _describe_completeness(overview: Overview) -> bool | None:
+    """Return whether the file ends with a whole state; None if it cannot be used anyway, where "yes" would mislead."""
+    is_refused = overview.verdict == DO_NOT_USE
+    return None if overview.complete and is_refused else overview.complete
 
 
 def _list_health_rows(overview: Overview) -> list[list[tables.Cell]]:

@@ -395,7 +395,10 @@ def list_verdict_on_set(answer: Parts) -> list[tuple[str, str]]:
     else:
         where = ""
     share = best.run_time_share
-    saves = "unknown" if share is None else f"{format_saved_share(share)}{where}"
+    if share is None:
+        saves = f"unknown: {best.cost_reason}" if best.cost_reason else "unknown"
+    else:
+        saves = f"{format_saved_share(share)}{where}"
     return [
         *_list_verdict_of_set(
             best,

@@ -278,6 +278,16 @@ def test_a_killed_run_is_said_to_be_incomplete(tmp_path: Path) -> None:
     assert "complete           no" in run("info", str(file)).stdout
 
 
+def test_a_refused_record_is_not_called_complete(tmp_path: Path) -> None:
+    text = Path(GLSTAT).read_text("utf-8")
+    assert "complete           yes" in run("info", GLSTAT).stdout
+    cut_out = text.replace(" internal energy", " nothing at all", 3)
+    file = put(tmp_path / "glstat", cut_out.encode())
+    screen = run("info", str(file)).stdout
+    assert screen.startswith("record  do not use it")
+    assert "complete" not in screen.partition("source")[2]
+
+
 def test_every_format_tells_the_same(matsum: Path) -> None:
     table = run("info", str(matsum)).stdout
     assert "states             1501" in table

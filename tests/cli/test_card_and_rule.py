@@ -45,7 +45,8 @@ def test_the_card_is_what_the_check_reads() -> None:
     result = run("card", *GOOD, "--part", "12,14-16", "--part", "11", "--merge", "11")
     assert result.exit_code == 0
     assert result.stderr == (
-        "next: add these cards to the main deck, then check it with d2rpick check DECK (main deck instead of DECK)\n"
+        "next: these times were not judged, because no history was given; add these cards to the main deck, then "
+        "check it with d2rpick check DECK (main deck instead of DECK)\n"
     )
     assert check_pasted(result) == [
         (part, 0.0135867, 0.0687534) for part in (11, 12, 14, 15, 16)

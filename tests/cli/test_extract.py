@@ -61,7 +61,10 @@ def test_what_is_extracted_reads_back_bit_for_bit(
     options = [option for name in energy for option in ("--energy", name)]
     result = run("extract", *options, source, "-o", str(file))
     assert (result.exit_code, result.stdout) == (0, "")
-    assert result.stderr == f"next: choose times with d2rpick suggest {file}\n"
+    assert result.stderr == (
+        f"next: choose times with d2rpick suggest {file}; print the cards from the run itself, because the table names "
+        "neither its solver nor all its parts\n"
+    )
     again = read_history([str(file)])
     assert again.channel == "internal_energy"
     assert again.format == ("csv" if suffix == "csv" else "hdf5")

@@ -110,7 +110,7 @@ def test_the_page_holds_parts_and_sets(tmp_path: Path) -> None:
     assert "http" not in text.replace("http-equiv", "")
 
 
-def test_where_nothing_can_be_recommended_the_answer_is_an_objection(
+def test_parts_without_a_weight_are_recommended_with_an_unknown_saving(
     tmp_path: Path,
 ) -> None:
     other_deck = put(
@@ -120,9 +120,13 @@ def test_where_nothing_can_be_recommended_the_answer_is_an_objection(
         ),
     )
     result = run("parts", "--deck", str(other_deck), MATSUM)
-    assert result.exit_code == 1
-    assert "no weight is known for shell (ELFORM 99)" in result.stdout
-    assert run("parts", "--exit-zero", "--deck", str(other_deck), MATSUM).exit_code == 0
+    # The verdict on the times does not depend on the weights: only the saving is unknown.
+    assert result.exit_code == 0
+    assert result.stdout.startswith("do not use  best set --part 1,2")
+    saves = next(line for line in result.stdout.splitlines() if line[:5] == "saves")
+    assert "unknown: no weight is known for shell (ELFORM 99)" in " ".join(
+        saves.split()
+    )
     weights = put(
         tmp_path / "site.toml",
         '[per_element]\n"shell (ELFORM 99)" = 1.0\nQBAT = 1.0\nBT = 1.0\n',
@@ -199,11 +203,18 @@ def test_calibrate_writes_what_weights_reads(tmp_path: Path) -> None:
     assert document["told"]
     for form in ("table", "markdown", "csv"):
         assert "QEPH" in run("calibrate", "-f", form, folder).stdout
+    lines = run("calibrate", folder).stdout.splitlines()
+    (covers,) = (line for line in lines if line.startswith("covers"))
+    assert covers.split()[1] == "QEPH;"
     site = tmp_path / "site.toml"
     assert run("calibrate", "-f", "toml", "-o", str(site), folder).exit_code == 0
     result = run(
         "parts", "-q", "-f", "json", "--weights", str(site), "--exit-zero", *WITH_DECK
     )
+    # Without a weight for a formulation, that of a similar one cannot be used either.
+    assert "weights-by-analogy" not in {
+        warning["code"] for warning in json.loads(result.stdout)["warnings"]
+    }
     assert json.loads(result.stdout)["weights"]["per_element"].keys() == {
         "QEPH",
         "point",

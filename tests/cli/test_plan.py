@@ -1,6 +1,7 @@
 """The command ``plan`` in all formats."""
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,7 +13,15 @@ from d2rpick.choice.td.plan import plan_run
 from d2rpick.histories.names import Selection
 from d2rpick.report.formats import DisplayOptions
 from d2rpick.report.plan import give_plan_sentence
-from tests.command import ENERGY, join_wrapped_lines, put, read_refusal, run, run_json
+from tests.command import (
+    BOX,
+    ENERGY,
+    join_wrapped_lines,
+    put,
+    read_refusal,
+    run,
+    run_json,
+)
 from tests.computed import locate_stored, read_starter
 from tests.drops import drop, write_run_files
 from tests.json_schemas import check_by_schema, run_json_checked
@@ -421,3 +430,22 @@ def test_a_copy_of_the_deck_holds_the_cards_and_passes_the_check(
     assert "--write-deck needs --deck" in read_refusal(
         "plan", "--part", "box", "--write-deck", str(folder), *history
     )
+
+
+def test_a_plan_explains_a_window_whose_vibration_error_is_only_small_beside_the_contact() -> (
+    None
+):
+    screen = run("plan", BOX).stdout
+    header = next(line for line in screen.splitlines() if "switch in" in line)
+    assert "error" in header.split()
+    words = " ".join(screen.split())
+    assert "residual 0.607 use next run" in words
+    reason = "use: the vibration after td is wrong by 61%, but the energy of this error is at most 0.43% of the energy"
+    limit = "of the next contact (limit for use: 1%): use only the motion. Expect: mean energy after td 97% to 98%"
+    assert f"flight 1 {reason} {limit}" in words
+    assert "judged internal_energy, not that of chosen parts (--part)" in words
+    assert "limit for use: 1%" in run("plan", "-f", "markdown", BOX).stdout
+    assert "limit for use: 1%" in run("plan", "-f", "csv", BOX).stdout
+    assert "limit for use: 1%" in run("suggest", BOX).stdout
+    flights = re.findall(r"^flight (\d+) ", screen, re.MULTILINE)
+    assert flights == sorted(flights, key=int)

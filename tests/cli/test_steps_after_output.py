@@ -278,3 +278,15 @@ def test_a_table_says_which_parts_its_energy_must_contain() -> None:
     of_parts = run("suggest", "--part", "box", MATSUM).stdout
     assert "all parts that vibrate with them; the table does not name" in of_table
     assert "assumes" not in of_parts
+
+
+def test_switches_without_a_time_are_not_sent_to_a_history(tmp_path: Path) -> None:
+    main = tmp_path / "main.k"
+    switch = "*DEFORMABLE_TO_RIGID\n         1\n"
+    main.write_text(
+        (SAMPLES / "rollover_box.k").read_text().replace("*END", f"{switch}*END")
+    )
+    step = run("check", str(main)).stdout
+    assert "not judged by time" in step
+    assert "--history HISTORY" not in step
+    assert "d2rpick rule D2R302" in step

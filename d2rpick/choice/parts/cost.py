@@ -183,7 +183,8 @@ class CostModel:
                 formulation = self.inventory.formulation(part, kind)
                 if formulation.cost is None or formulation.measured:
                     continue
-                if formulation.name not in self.weights.per_element:
+                weights = self.weights.per_element
+                if formulation.name not in weights and formulation.cost in weights:
                     names[formulation.name] = None
         return tuple(names)
 

@@ -71,7 +71,7 @@ class PartSet(NamedTuple):
     ``rigid_fraction`` its share of the record [-].  ``angle_error`` is the rotation error of a body at td [degrees]; it
     and the position error may be larger if ``position_is_lower_bound``.  ``moving`` are the parts that move relative to
     the rest; ``apart``: some of them fly away from the body that they are to become part of.  ``decision`` is the
-    verdict on the window.
+    verdict on the window, ``cost_reason`` says why the saving is unknown.
     """
 
     name: str
@@ -97,6 +97,12 @@ class PartSet(NamedTuple):
     reasons: tuple[str, ...] = ()
     recommended: bool = False
     decision: Decision | None = None
+    cost_reason: str | None = None
+
+    @property
+    def rigid_share_of_elements(self) -> float:
+        """Elements that are rigid, times the fraction of the run for which they are [-]; 0 if either is unknown."""
+        return (self.element_fraction or 0.0) * (self.rigid_fraction or 0.0)
 
     @property
     def saving(self) -> float | None:
@@ -191,7 +197,12 @@ def compare_sets_of_parts(
         # Parts at rest relative to the body may fly longer than parts that move relative to it.
         if still_parts and sets[-1].moving:
             sets.append(comparison.of(PartSet(_STILL, still_parts), times))
-    recommended_sets = tuple(_mark_recommended(_drop_repeated_sets(sets)))
+    recommended_sets = tuple(
+        _mark_recommended(
+            _drop_repeated_sets(sets),
+            has_all_elements=model is not None and model.inventory.complete,
+        )
+    )
     cautions = (
         *((foreign,) if foreign else ()),
         *_warn_about_sets(run, facts, model, rows, recommended_sets),
@@ -346,6 +357,7 @@ class _SetComparison:
             element_fraction=element_fraction,
             mass_fraction=self._mass_fraction(part_set.parts),
             cost_share=share.value,
+            cost_reason=share.reason,
             step_growth=compute_step_growth(self.rows, {*part_set.parts, *rigid}),
         )
 
@@ -440,21 +452,26 @@ def _add_position_error(part_set: PartSet, situation: Situation, tr: float) -> P
     return placed
 
 
-def _mark_recommended(sets: Sequence[PartSet]) -> Iterator[PartSet]:
+def _mark_recommended(
+    sets: Sequence[PartSet], *, has_all_elements: bool
+) -> Iterator[PartSet]:
     """Mark the recommended set: the one with the largest saving or, if savings are equal, with the fewest parts.
 
-    A set with a poor pair, or with too large a position error, is considered only if all sets have one.
+    A set with a poor pair, or with too large a position error, is considered only if all sets have one.  If no saving
+    is known for want of weights, the rigid share of the elements replaces it, because the verdict on the times does not
+    depend on the weights; ``has_all_elements``: the elements of all parts are known.
     """
-    useful = [
-        part_set
-        for part_set in sets
-        if part_set.saving is not None and part_set.saving > 0
-    ]
+    gains = {part_set.parts: part_set.saving for part_set in sets}
+    if has_all_elements and all(gain is None for gain in gains.values()):
+        gains = {part_set.parts: part_set.rigid_share_of_elements for part_set in sets}
+    useful = [part_set for part_set in sets if (gains[part_set.parts] or 0.0) > 0]
     usable = [part_set for part_set in useful if part_set.is_usable] or useful
     in_place = [part_set for part_set in usable if not part_set.out_of_place] or usable
-    largest = max((part_set.saving or 0.0 for part_set in in_place), default=0.0)
+    largest = max((gains[part_set.parts] or 0.0 for part_set in in_place), default=0.0)
     alike = [
-        part_set for part_set in in_place if (part_set.saving or 0.0) >= largest - _LIKE
+        part_set
+        for part_set in in_place
+        if (gains[part_set.parts] or 0.0) >= largest - _LIKE
     ]
     best = min(alike, key=lambda part_set: len(part_set.parts), default=None)
     for part_set in sets:
