@@ -31,7 +31,7 @@ def main() -> None:
         raise KeyboardInterrupt
 
     def interrupt_again(ignored: "sys.UnraisableHookArgs") -> None:
-        """Repeat an interrupt that is swallowed while an object is deleted; print no traceback of it."""
+        """Repeat an interrupt that Python swallows while it deletes an object, and print no traceback for it."""
         if ignored.exc_type is KeyboardInterrupt:
             from _thread import start_new_thread
 

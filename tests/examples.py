@@ -87,7 +87,7 @@ def run_shown_command(command: str) -> str:
 
 def round_numbers(text: str) -> str:
     """Drop the digits that depend on the machine: the last ones at full precision, and errors close to zero."""
-    text = _FULL_PRECISION.sub(lambda number: f"{float(number[0]):.10g}", text)
+    text = _FULL_PRECISION.sub(lambda number: f"{float(number[0]):.7g}", text)
     return _NEXT_TO_NOTHING.sub(lambda number: f"{float(number[0]):.3g}", text)
 
 

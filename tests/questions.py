@@ -1,7 +1,7 @@
 """The indexes of the frequently asked questions: each question with a link, and the bold text of its answer.
 
-``python -m tests.questions`` writes them to docs/how-to/faq.md (planning a switch) and switched-faq.md (cards,
-switched run and CI), so that each can be scanned at a glance; a test holds them current.
+``python -m tests.questions`` writes them to docs/how-to/faq.md (planning a switch), model-faq.md (the model) and
+switched-faq.md (cards, switched run and CI), so that each can be scanned at a glance; a test holds them current.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ FOLDER: Final = ROOT / "docs" / "how-to"
 # Titles of the indexes, and labels of their pages, in the order of the lists.
 INDEXES: Final = {
     "faq": "Frequently asked questions: planning a switch",
+    "model-faq": "Frequently asked questions: your model",
     "switched-faq": "Frequently asked questions: cards, switched run and CI",
 }
 PAGES: Final = {
@@ -27,7 +28,10 @@ PAGES: Final = {
         "faq-files": "Files",
         "faq-answer": "Answer",
         "faq-times": "Times",
+    },
+    "model-faq": {
         "faq-models": "Model",
+        "faq-special": "Special cases",
     },
     "switched-faq": {
         "faq-solver": "Cards",
@@ -82,8 +86,16 @@ def make_index(index: str) -> str:
         question for question in list_questions() if question.page in PAGES[index]
     ]
     lines = [f"# {INDEXES[index]}", "", _INTRODUCTION, ""]
-    for other in INDEXES:
-        lines += _make_menu(other, "" if other == index else f"{other}.md")
+    for page, label in PAGES[index].items():
+        lines.append(f"* **{label}.** {', '.join(_link_topics(page, ''))}")
+    others = [
+        link
+        for other in INDEXES
+        if other != index
+        for page in PAGES[other]
+        for link in _link_topics(page, f"{other}.md")
+    ]
+    lines.append(f"* **Other lists.** {', '.join(others)}")
     topic = ""
     for question in questions:
         if question.topic != topic:
@@ -95,14 +107,12 @@ def make_index(index: str) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _make_menu(index: str, file: str) -> Iterator[str]:
-    """Yield a line for each page of an index, with links to its topics in ``file``."""
-    for page, label in PAGES[index].items():
-        topics = dict.fromkeys(
-            question.topic for question in list_questions() if question.page == page
-        )
-        links = ", ".join(f"[{topic}]({file}#{make_anchor(topic)})" for topic in topics)
-        yield f"* **{label}.** {links}"
+def _link_topics(page: str, file: str) -> list[str]:
+    """Return links to the topics of a page, whose questions are listed in the index ``file``."""
+    topics = dict.fromkeys(
+        question.topic for question in list_questions() if question.page == page
+    )
+    return [f"[{topic}]({file}#{make_anchor(topic)})" for topic in topics]
 
 
 if __name__ == "__main__":

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     # A number in the unit of the run, or a string with a unit, e.g. 64ms.
     Time = float | str
 
-# Largest number of characters of a wrong value that are shown in a message.
+# Largest number of characters of an invalid value that are shown in a message.
 _LONGEST_SHOWN: Final = 60
 
 
@@ -77,7 +77,7 @@ def is_whole_number(value: object) -> bool:
 
 
 def _format_wrong_value(value: object) -> str:
-    """Return a wrong value as a single line of limited length."""
+    """Return an invalid value as a single line, shortened if it is long."""
     text = " ".join(repr(value).split())
     if len(text) <= _LONGEST_SHOWN:
         return text

@@ -19,7 +19,7 @@ UNJOINED: Final = "parts-not-joined"
 def collect_objections(
     card: PrintedCard, question: RunQuestion, parts: int
 ) -> Iterator[Caution]:
-    """Yield the findings of ``check`` for the deck with the card or, without a deck, state what remains unknown.
+    """Yield the findings of ``check`` for the deck with the card or, without a deck, a warning about shared nodes.
 
     ``parts`` is the number of parts that the card switches by their ids.
     """

@@ -108,7 +108,7 @@ def check(
     history : Run, optional
         The run by whose history the windows are judged; it must not be switched.
     select, ignore : string or several
-        Rules by id or its beginning; default: by the configuration nearest to the deck.
+        Rules by id or by the beginning of the id; default: the rules selected in the configuration nearest to the deck.
     **choosing
         How to judge, as for `suggest`.
 

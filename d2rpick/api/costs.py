@@ -1,4 +1,4 @@
-"""Determine which parts may be switched and what sets of parts save, and fit element costs to the runs of a site."""
+"""Determine which parts may be switched and how much sets of parts save; fit element costs to the runs of a site."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def parts(
     td: Time | None = None,
     **choosing: Unpack[Choosing],
 ) -> PartTable:
-    """Determine which parts of a run may be switched and what sets of parts save, as ``d2rpick parts`` does.
+    """Determine which parts of a run may be switched and how much sets of parts save, as ``d2rpick parts`` does.
 
     Parameters
     ----------

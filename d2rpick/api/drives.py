@@ -169,6 +169,8 @@ class Driving:
             if leg.findings.why and not leg.findings.idle
         ]
         flights = tuple(windows(legs, self.limits))
+        # An engine run that was taken back instead of being computed again has no cycles.
+        computed_legs = [leg for leg in legs if leg.cycles != 0]
         warnings = [
             Caution("out-of-place", window.warning)
             for window in flights
@@ -178,9 +180,12 @@ class Driving:
             run=open_run(names),
             deck=self.deck,
             windows=flights,
-            legs=tuple(legs),
+            legs=tuple(computed_legs),
             why=reasons[-1] if reasons else "",
-            saved=(self._by_model(legs), _estimate_saving_by_time(legs, self.deck.end)),
+            saved=(
+                self._by_model(computed_legs),
+                _estimate_saving_by_time(computed_legs, self.deck.end),
+            ),
             cautions=(*self.cautions, *warnings),
             command=tuple(command),
         )

@@ -182,7 +182,7 @@ class Box:
         "Stiffness of the ground at a point, N/m.  [default: 5e5]", POSITIVE
     )
     scan: bool = make_option(
-        "Compute many tr, and compare each run with the reference run.",
+        "Compute switched runs for many values of tr, and compare each run with the reference run.",
         "flag",
         default=False,
     )

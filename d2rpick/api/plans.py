@@ -111,7 +111,7 @@ def explore(
     td_window : (float, float), optional
         Range of td [time].  Default: the longest flight; if there is none but td is given, the record.
     steps : int
-        Number of evenly spaced td; the peaks of the energy are added.
+        Number of evenly spaced values of td; the peaks of the energy are added.
     parts, flying, deck, weights, **choosing
         As for `suggest`.
 
@@ -263,8 +263,8 @@ def plan(
     parts, flying, deck, weights, **choosing
         As for `suggest`.
     min_rigid : float or text, optional
-        Leave shorter windows out [time].  Default: 5 % of the record, and a window that locks in energy before one more
-        than twice as long.
+        Leave out shorter windows [time].  Default: 5 % of the record; a window that freezes vibration energy is also
+        left out if a later window is more than twice as long.
     done : pairs of float
         Windows (tr, td) in which the run was switched [time].
     before : Run, optional

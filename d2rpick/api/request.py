@@ -1,4 +1,4 @@
-"""Define in a single table everything that a user can ask about a run.
+"""Define, in a single table, all options of the questions that a user can ask about a run.
 
 The fields of `Request` determine the options of the command line with their environment variables, the keyword
 arguments of Python, and the command line that repeats an answer.
@@ -19,6 +19,7 @@ from d2rpick.base.options import (
     make_option,
     make_option_name,
 )
+from d2rpick.choice import options as choice_options
 from d2rpick.choice.options import ChoiceOptions, list_uses
 from d2rpick.choice.pair import grades
 from d2rpick.histories.formats import READERS
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
     from d2rpick.vibration.oscillator import Oscillator
 
 MIN_MEAN_ENERGY: Final = grades.MIN_MEAN_ENERGY
+MIN_QUALITY: Final = choice_options.MIN_QUALITY
 # Options for reading a history; a deck that is checked defines its parts itself.
 READING: Final = ("input_format", "time", "energy", "part", "flying", "channel")
 _READING_FOR_CARDS: Final = tuple(name for name in READING if name != "part")
@@ -53,8 +55,8 @@ ADVANCED: Final = (
 )
 JUDGING: Final = (*_READING_FOR_CARDS, *CHOOSING_FOR_CARDS)
 _NOT_TYPED: Final = ("history", "given", "run_folder", "deck_in_folder")
-# Placeholder for weights that were not read from a file.
-# A command line with this placeholder is refused, because the placeholder does not contain the weights.
+# Placeholder in a command line for weights that were not read from a file.
+# d2rpick refuses such a command line, because it does not contain the weights.
 _IN_MEMORY: Final = "<weights in memory>"
 
 
@@ -115,7 +117,7 @@ class Request(ChoiceOptions, ReadingOptions):
     ``given`` names the options that were given, also those given with their default value.
     """
 
-    stiffness: float | None = _make_oscillator_option("Spring k.")
+    stiffness: float | None = _make_oscillator_option("Spring stiffness k.")
     mass: float | None = _make_oscillator_option("Suspended mass M.")
     frame_mass: float | None = _make_oscillator_option(
         "Frame mass m (or give --beta).", POSITIVE, "beta"
@@ -272,7 +274,7 @@ class Request(ChoiceOptions, ReadingOptions):
         return (*self.checking(), *self.asking(("part",)))
 
     def repeat(self, *, without: Collection[str] = ()) -> RepeatedQuestion:
-        """Return the parts of the command line with which other commands ask about the same run."""
+        """Return the parts, options and files with which other commands ask about the same run."""
         from d2rpick.report.formats import RepeatedQuestion
 
         left_out = {"part", *without}

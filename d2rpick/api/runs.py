@@ -297,7 +297,7 @@ def from_frame(
 
 
 def _set_time_column(frame: pd.DataFrame, time: str | None) -> pd.DataFrame:
-    """Turn the index into a column if it contains the times; raise ValueError if nothing is named as the time."""
+    """Turn the index into a column if it contains the times; raise ValueError if no name denotes the time."""
     from d2rpick.histories.meaning import is_time
 
     index = frame.index

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class TimeUnit(NamedTuple):
-    """Time unit of a run, empty if it is unknown, and the source that should give the unit."""
+    """Time unit of a run (empty if unknown), and the name of the input that would have to define the unit."""
 
     name: str
     source: str

@@ -13,7 +13,7 @@ from typing import Any, Final
 from d2rpick.base.ranges import Number
 from d2rpick.base.tuples import NamedTuple
 
-# Upper limit of an integer range that has no upper limit of its own.
+# Upper limit of an integer range if no other upper limit is defined.
 UNLIMITED: Final = 2**63
 # Ranges of numbers, with names that describe the numbers in the range.
 TIME: Final = Number()

@@ -116,7 +116,7 @@ class Cores(Farm):
         """
         self._is_closed = True
         self._leash.close()
-        # After an interrupt, the thread that uses the pool may hold its lock for ever: it waits for a dead process.
+        # After an interrupt, the pool's thread may keep its lock for ever, because it waits for a dead process.
         if KeyboardInterrupt not in exception:
             self._pool.shutdown(wait=True, cancel_futures=True)
 
@@ -190,7 +190,7 @@ class Cores(Farm):
     def _answer_alone(
         self, number: int, function: Callable[[Item], Result], item: Item
     ) -> Finished:
-        """Execute a call in a pool of its own, so that a crash of its process affects no other call."""
+        """Execute a call in a separate pool, so that a crash of its process affects no other call."""
         pool, future = self._begin_pool(1, function, item)
         answer = _make_answer(number, future)
         pool.shutdown(wait=False)
@@ -231,7 +231,7 @@ def _make_answer(number: int, future: Future[Any]) -> Finished:
 
 def _begin_work(held: Connection) -> None:
     """Exit this process when the other end of ``held`` is closed; an interrupt ends the process without a message."""
-    # A spawned process still has this handler; in a forked process, `interruptible` has already changed it.
+    # A spawned process still has Python's own handler; in a forked process, `interruptible` has already replaced it.
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, signal.SIG_DFL)
 

@@ -304,7 +304,7 @@ class PairSuggestion(AnswerAtTd):
 
     @cached_property
     def acceptable_windows(self) -> tuple[tuple[float, float], ...]:
-        """First and last tr of each window of acceptable tr, on any basis [time]."""
+        """First and last tr of each window of acceptable tr; empty if td lies outside the flight [time]."""
         if not self.situation.in_flight:
             return ()
         # Imported here to keep start-up fast.

@@ -50,7 +50,7 @@ WRONG_ENERGY: Final = "engine-wrong-energy"
 OF_THE_MODEL = ("contact-in-window", "work-in-window")
 
 _UNRELIABLE: Final = "do not rely on the internal energy"
-# _WITHIN: the criteria below compare a state with all states that are earlier by this fraction of the record [-].
+# _WITHIN: smallest time between a state and the earlier states it is compared with, as a fraction of the record [-].
 # _GAIN: smallest ratio of the kinetic energy of a diverged run to the largest earlier energy [-].
 # _SPEED: smallest ratio of the kinetic energy of a diverged run to the internal energy [-].
 # _TORN: smallest ratio of the internal energy of a diverged run to its earlier maximum, as its elements tear [-].
@@ -393,7 +393,7 @@ def _describe_divergence(history: History) -> str | None:
     time = balance.time
     kinetic = np.abs(balance.kinetic)
     internal = np.abs(balance.internal)
-    # This array gives, for each state, the number of states that are earlier by more than the fraction _WITHIN.
+    # For each state, this array contains the number of states that are earlier by more than the fraction _WITHIN.
     earlier = np.searchsorted(time, time - _WITHIN * (time[-1] - time[0]))
     counted = (
         np.concatenate([[0], np.cumsum(kinetic + internal > 0)])[earlier] >= _FEWEST

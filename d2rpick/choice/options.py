@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 # Names used in messages for quantities whose names differ from their keys.
 _QUANTITIES: Final = {"kinetic_share": "kinetic fraction"}
+# Help for ``min_quality``, to which each command appends its default.
+MIN_QUALITY: Final = "Lowest grade that is not reported as a problem (exit code 1)."
 
 
 class Limit(NamedTuple):
@@ -104,14 +106,14 @@ class ChoiceOptions:
         metadata=_describe_use(of_cards=True),
     )
     landing: float | None = make_option(
-        "Time of the next contact after the flight; td is earlier by the margin.  [default: found from the record]",
+        "Time of the next contact after the flight; td lies one margin before it.  [default: found from the record]",
         TIME,
         "T",
         metadata=_describe_use(of_cards=True),
     )
     margin: float | None = make_option(
-        "Time kept free after the load and before the next contact.  [default: 0; before the contact it is "
-        "derived if d2rpick chooses td, or with `landing`]",
+        "Time kept free after the load and before the next contact.  [default: after the load 0; before the "
+        "contact derived, if d2rpick chooses td or `landing` is given]",
         NOT_NEGATIVE,
         "T",
         metadata=_describe_use(of_cards=True),
@@ -136,7 +138,7 @@ class ChoiceOptions:
         metadata=_describe_use(limit=Limit("residual"), of_cards=True),
     )
     fit_window: tuple[float, float] | None = make_option(
-        "Window of time in which the oscillator is identified.",
+        "Time range to which the oscillator is fitted.",
         TIME,
         "LO HI",
         pair=True,
@@ -156,12 +158,12 @@ class ChoiceOptions:
         metadata=_describe_use(),
     )
     min_quality: str | None = make_option(
-        "Lowest grade that is not reported as a problem (exit code 1).  [default: fair; poor if only `td` is given]",
+        f"{MIN_QUALITY}  [default: fair]",
         GRADES,
         metadata=_describe_use(of_cards=True, of_sets=False),
     )
     cost_share: float | None = make_option(
-        "Share of the cost of a time step that the elements of the switched parts take, to predict the CPU time.",
+        "Fraction of the CPU time of a time step spent on the elements of the switched parts, to predict the saving.",
         FRACTION,
         "C",
         metadata=_describe_use(of_sets=False, is_advanced=True),

@@ -300,7 +300,7 @@ def _measure_sampling(time: Samples) -> Sampling | None:
 
 
 def _apply_deck(run: OpenedRun, deck: str) -> tuple[OpenedRun, tuple[Caution, ...]]:
-    """Add the supports, gravity and joints that a deck defines to the run, and warnings; raise DeckError on failure."""
+    """Return the run with the supports, gravity and joints of a deck, and warnings; raise DeckError on failure."""
     # Imported here to keep start-up fast.
     from d2rpick.choice.parts.deck_of_run import (
         add_surroundings,

@@ -166,7 +166,7 @@ class _CommandGroup(Documented, click.Group):
                 explain_error(error, ctx.meta.get("d2rpick.history", ()))
             ) from error
 
-    def main(  # type: ignore[override]  # options of click that are not needed are omitted
+    def main(  # type: ignore[override]  # click parameters that are not needed are omitted
         self,
         args: Sequence[str] | None = None,
         prog_name: str | None = None,

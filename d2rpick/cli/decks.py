@@ -109,15 +109,15 @@ def _read_windows(
 @options.add_options(*REFERENCE)
 @click.option(
     "--select", metavar="IDS", multiple=True, type=choose_click_type("rules"),
-    help="Check only these rules, by id or its beginning: D2R101,D2R2.  [default: set in d2rpick.toml or "
-    "pyproject.toml]",
+    help="Check only these rules, by id or by the beginning of the id: D2R101,D2R2.  [default: the rules selected in "
+    "d2rpick.toml or pyproject.toml, otherwise all]",
 )  # fmt: skip
 @click.option(
     "--ignore",
     metavar="IDS",
     multiple=True,
     type=choose_click_type("rules"),
-    help="Skip these rules; overrules --select.",
+    help="Skip these rules; takes precedence over --select.",
 )
 @click.option(
     "--fail-on", type=click.Choice(["error", "warning"]), default="error", show_default=True,
@@ -134,9 +134,9 @@ def check(
 ) -> None:
     """Find the switching cards of LS-DYNA decks and Radioss runs, and check them against deck and history.
 
-    Each DECK is read with its includes.  A folder means the main decks in it, `-` means standard input.  The starter
-    deck and the engine files of a Radioss run are one DECK; name any of them.  `d2rpick rule` lists the rules.  A
-    comment line `$ d2rpick: ignore D2R104` before a card (Radioss: `#`) turns this rule off for the card.
+    Each DECK is read with its includes.  A folder means the main decks in it, and `-` means standard input.  The
+    starter deck and the engine files of a Radioss run are one DECK; name any of them.  `d2rpick rule` lists the rules.
+    A comment line `$ d2rpick: ignore D2R104` before a card (Radioss: `#`) turns this rule off for the card.
 
     Examples
     --------

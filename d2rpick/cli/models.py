@@ -82,7 +82,7 @@ def replay(motion: Motion, output: Output) -> None:
     output_format={
         "type": click.Choice(list(FORMATS["rollover"])),
         "default": None,
-        "help": "Form of a scan.  [default: table]",
+        "help": "Format of the scan result.  [default: table]",
     },
     plot="Draw the motion of the box, or the scan, to FILE (png, svg, pdf).",
 )
@@ -92,7 +92,8 @@ def rollover(box: Box, output: Output) -> None:
     The box is deformable throughout, or rigid from each tr to its td.  The step that meets the curb stays deformable,
     or is switched together with the box (--with-step).
     The columns are time, position, roll, velocities and energies of the box, the momentum of box and step, and the
-    energy balance of the model.  The file glstat contains the energies of the model, matsum the energies of each part.
+    energy balance of the model.  The file glstat contains the energies of the model, and the file
+    matsum contains the energies of each part.
 
     Examples
     --------
@@ -156,8 +157,8 @@ def _scan(box: Box, output: Output) -> None:
 )
 @click.option(
     "--section", type=click.Choice(SECTIONS), multiple=True,
-    help="Section of the paper to reproduce; repeatable.  1: the setting, early switches of the box; 2: the "
-    "oscillator; 3: finite elements; 4: the choice, the revised pair, variants; 5: what is saved.",
+    help="Section of the paper to reproduce; repeatable.  1: the problem, and early switches of the box; 2: "
+    "the oscillator; 3: finite elements; 4: the choice, the revised pair, variants; 5: the saving.",
 )  # fmt: skip
 @options.make_file_option(
     "--solver",

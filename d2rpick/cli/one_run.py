@@ -12,6 +12,7 @@ from d2rpick.api.request import (
     CHOOSING,
     CHOOSING_FOR_SETS,
     MIN_MEAN_ENERGY,
+    MIN_QUALITY,
     READING,
     Request,
     check_window,
@@ -89,9 +90,10 @@ def extract(write_as: str | None, request: Request, output: Output) -> None:
     """Write the chosen energy of HISTORY as columns time and internal_energy.
 
     With several parts, a column part_<id> follows for each.  A column not_chosen_part_<id> follows for each other part
-    that flies with the chosen parts, so that the table gets the verdict of the run.  Other columns are
-    quantities of the whole model, such as total internal energy, kinetic energy, external work and momentum.  If the
-    files contain part momenta, the momentum is the sum over the parts that fly together with the chosen parts.
+    that flies with the chosen parts, so that d2rpick gives the same verdict for this table as for the original run.
+    Other columns are quantities of the whole model, such as total internal energy, kinetic energy, external work and
+    momentum.  If the files contain part momenta, the momentum is the sum over the parts that fly together with the
+    chosen parts.
 
     Examples
     --------
@@ -127,6 +129,7 @@ def extract(write_as: str | None, request: Request, output: Output) -> None:
     *ONE_RUN,
     *ANSWER,
     deck=DECK_OF_PARTS,
+    min_quality=f"{MIN_QUALITY}  [default: fair; poor if only --td is given]",
     forms=[*FORMATS["suggestion"], "card"],
 )
 def suggest(
@@ -216,7 +219,7 @@ def _finish_answer(
 @options.make_click_option(
     "steps",
     Option(
-        "Number of evenly spaced td; the peaks of the energy are added.",
+        "Number of evenly spaced values of td; the peaks of the energy are added.",
         range(1, 100_001),
     ),
     default=200,
@@ -238,7 +241,7 @@ def explore(
     cards: Cards,
     output: Output,
 ) -> None:
-    """Show for each time td to switch back the best tr, the error, and the saving.
+    """For each td, show the best tr, the error and the saving.
 
     In --td-window, or in the longest flight, d2rpick compares evenly spaced values of td, and every peak of the energy.
     It judges each td as `suggest --td` does.  The table lists the pairs that no other pair beats in both error and
@@ -362,15 +365,15 @@ def verify(
         *RESULT,
     ),
     deck=f"{DECK}.",
-    step_ratio="Ratio of the time step while rigid to the one before, 1 or more.",
+    step_ratio="Time step while the parts are rigid, divided by the time step before, 1 or more.",
     report="Write everything to one HTML page to read and sign.",
     forms=FORMATS["parts"],
 )
 def parts(tr: float | None, td: float | None, request: Request, output: Output) -> None:
-    """List which parts of a run may be switched, and what sets of parts save.
+    """List which parts of a run may be switched, and how much CPU time various sets of parts save.
 
-    Each part is listed with its elements, material, mass and energy, and a verdict with its reasons.  Sets of parts
-    follow with the CPU time that they save, and the recommended set.  --part adds a set to the comparison.
+    Each part is listed with its elements, material, mass and energy, and a verdict with its reasons.  The sets of parts
+    follow, each with the CPU time that it saves; one set is recommended.  --part adds a set.
 
     Examples
     --------
@@ -396,7 +399,8 @@ def parts(tr: float | None, td: float | None, request: Request, output: Output) 
 
 @options.make_command
 @options.make_click_option("min_rigid", Option(
-    "Shortest rigid window.  [default: 5% of the record; a window is dropped for a later one twice as long]",
+    "Shortest rigid window.  [default: 5% of the record; a window that freezes vibration energy is also "
+    "left out if a later window is more than twice as long]",
     *(NOT_NEGATIVE, "T"),
 ))  # fmt: skip
 @click.option(
@@ -447,8 +451,8 @@ def plan(
 ) -> None:
     """Plan the rigid windows of a run: tr and td of each flight, and whether HISTORY supports them.
 
-    HISTORY supports the windows up to and including the first that freezes vibration energy: it shifts later landings.
-    Run with these windows, then plan the next ones from the switched run, with --done.
+    HISTORY supports the windows up to and including the first window that freezes vibration energy, because this window
+    shifts the later landings.  Run with these windows, then plan the next windows from the switched run, with --done.
 
     Examples
     --------

@@ -42,7 +42,7 @@ _NARROWEST: Final = 40
 _NAMED: Final = {".json": "json", ".ndjson": "ndjson", ".csv": "csv", ".md": "markdown"}
 # Suffixes of unsupported files that users may expect for a report.
 _PRINTED: Final = (".pdf", ".doc", ".docx")
-# Pattern of those lines of a result that are bold: recommendations, verdicts, and findings of rules.
+# Pattern of the result lines that are printed in bold: recommendations, verdicts, and findings of rules.
 _VERDICTS: Final = "use|use with care|do not use|no pair to use|common tr"
 _ANSWER: Final = rf"(?m)^(\* |(  )?({_VERDICTS})\b|  .*:\d+:\d+: (error|warning) D2R).*"
 # Code of the warning about a truncated file.
@@ -265,7 +265,7 @@ class Output:
         question: RepeatedQuestion,
         deck: str | None,
     ) -> bool:
-        """Write a card with its cautions and the step after it; return False if there is no card or a bad window.
+        """Write a card, its warnings and the next step; return False if there is no card or a window did not pass.
 
         ``question`` and ``deck`` are those of the next command.
         """

@@ -23,7 +23,7 @@ _PERIOD: Final = 1.0
 def show_reading(
     names: Sequence[str], *, quiet: bool, period: float = _PERIOD
 ) -> Iterator[None]:
-    """Show on a terminal how long the reading of ``names`` has taken [s], unless ``quiet``.
+    """Show on the terminal for how long ``names`` have been read so far [s]; do nothing if ``quiet``.
 
     ``period`` is the time before the first line, and between two lines [s].  The remaining time is unknown: how much of
     a file must be read depends on the question.
@@ -46,7 +46,7 @@ def show_reading(
 
 @contextmanager
 def show_computing(*, quiet: bool, period: float = _PERIOD) -> Iterator[None]:
-    """Show on a terminal how long the computation of an answer has taken [s], unless ``quiet``."""
+    """Show on the terminal for how long an answer has been computed so far [s]; do nothing if ``quiet``."""
     with show_progress(
         lambda seconds: f"computing ... {seconds:.0f} s", quiet=quiet, period=period
     ):
@@ -109,7 +109,7 @@ def is_on_terminal() -> bool:
 def show_progress(
     say: Callable[[float], str], *, quiet: bool, period: float = _PERIOD
 ) -> Iterator[None]:
-    """While code runs, show on a terminal the text that ``say`` returns for the elapsed seconds, unless ``quiet``."""
+    """While code runs, show the text ``say(elapsed_seconds)`` on the terminal; do nothing if ``quiet``."""
     if quiet or not is_on_terminal():
         yield
         return

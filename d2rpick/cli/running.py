@@ -39,7 +39,8 @@ CMD = ("program", "CMD")
     ),
 )
 @options.make_click_option("wait", Option(
-    "Time without force after which the parts fly.  [default: half of the longest vibration period found so far]",
+    "Time without force after which the parts are treated as flying.  [default: half of the "
+    "longest vibration period found so far]",
     *(POSITIVE, "T"),
 ))  # fmt: skip
 @options.make_click_option(
@@ -90,11 +91,12 @@ def drive(
     output: Output,
     **driving_options: Any,
 ) -> None:
-    r"""Compute a Radioss run that needs no reference run, because d2rpick switches the parts as it proceeds.
+    r"""Compute a Radioss run that needs no reference run, because d2rpick switches the parts as the run proceeds.
 
-    DECK, a starter deck with one engine file, is copied into RUNDIR.  The parts fly when no force has acted on them for
-    the time --wait.  A rigid probe run then finds the next contact.  The run continues deformable from the margin
-    before the contact.  The same command computes the same run.  --resume continues an interrupted run.
+    DECK, a starter deck with one engine file, is copied into RUNDIR.  The parts are treated as flying when no force has
+    acted on them for the time --wait.  A rigid probe run then finds the next contact.  From one margin before this
+    contact, the run continues with deformable parts.  The result is reproducible: the same command gives the same run.
+    --resume continues an interrupted run.
 
     Examples
     --------
@@ -156,7 +158,8 @@ def _plan(driving: Driving) -> list[str]:
 @options.make_command
 @click.argument("run", metavar="RUN", type=choose_click_type("file"))
 @options.make_click_option("wait", Option(
-    "Time without force after which the parts fly.  [default: half of the longest vibration period found]",
+    "Time without force after which the parts are treated as flying.  [default: half of the "
+    "longest vibration period found]",
     *(POSITIVE, "T"),
 ))  # fmt: skip
 @click.option(
@@ -223,14 +226,15 @@ def follow(
 @options.make_click_option(
     "part",
     Option(
-        "Parts to switch, by number (3,7) or range (10-19).  [default: Radioss, parts of deactivated rigid bodies]",
+        "Parts to switch, by number (3,7) or range (10-19).  [default: for Radioss, parts of the rigid bodies that "
+        "the deck deactivates]",
         *("names", "IDS"), many=True,
     ),
 )  # fmt: skip
 @options.make_click_option(
     "wait",
     Option(
-        "Time without force after which the parts fly.  [default: derived from the deck]",
+        "Time without force after which the parts are treated as flying.  [default: derived from the deck]",
         POSITIVE,
         "T",
     ),
@@ -255,7 +259,7 @@ def first(
     """Write a copy of DECK that switches the parts in its first run, so that no reference run is needed.
 
     The solver makes the parts rigid when no contact force has acted for the time --wait, and deformable at the next
-    force.  For Radioss, the copy contains engine files whose runs sensors end, and the missing rigid bodies.  For
+    force.  For Radioss, the copy contains the missing rigid bodies, and engine files for runs that sensors end.  For
     LS-DYNA, it contains switches with contact codes.
 
     Examples

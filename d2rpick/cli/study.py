@@ -48,7 +48,7 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--from", "listed", envvar="D2RPICK_STUDY_FROM", metavar="LIST", type=choose_click_type("file"),
-    help="File with more names of runs, one per line; - is stdin.",
+    help="File with the names of further runs, one per line; - is stdin.",
 )  # fmt: skip
 @options.make_file_option(
     "--resume",
@@ -78,7 +78,7 @@ def study(
     request: Request,
     output: Output,
 ) -> None:
-    """Choose tr for many runs: each tr, how far the runs agree, and one tr for all.
+    """Choose tr for each of many runs, show how well the values agree, and give a common tr if there is one.
 
     If you omit --td and --td-window, both times of each run are chosen in its longest flight.  Each RUN is a file, a
     folder with the files of one run, or a pattern that matches runs.  A run that cannot be read is reported in its row

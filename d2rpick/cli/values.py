@@ -39,7 +39,7 @@ else:
 
 CARDS: Final = tuple(list_options(Cards))
 _PAIR: Final = 2  # Number of values of an option that takes a pair.
-# Options that apply only together with others; settings may set them even for commands without these others.
+# Options that settings may contain for every command, but that apply only if one of the listed options is given.
 _BESIDE: Final[dict[str | None, tuple[str, ...]]] = {
     "weights": ("deck",),
     "step_ratio": ("cost_share", "deck"),

@@ -1,4 +1,4 @@
-"""Find settings with which switches by a force make parts rigid in the planned windows.
+"""Find settings with which force-triggered switches make parts rigid in the planned windows.
 
 These are TIME1, TIME2, TIME3 and OFFSET of an LS-DYNA pair, or Tdelay of a Radioss sensor. A force switch has no times
 of its own. One wait for all windows is chosen so that, with the known contact times of a run, the resulting windows are
@@ -37,7 +37,7 @@ class Pushes(NamedTuple):
 
 
 class ForceTiming(NamedTuple):
-    """Times of a switch by a force, and the windows in which it makes parts rigid.
+    """Times of a force-triggered switch, and the windows in which it makes parts rigid.
 
     The switch acts between ``earliest`` and ``latest``. ``wait`` is TIME3 of the set that makes parts deformable, or
     Tdelay. ``offset`` is a distance, 0 if the card has no offset.
@@ -53,7 +53,7 @@ class ForceTiming(NamedTuple):
 def find_pair_timing(windows: Sequence[Times], pushes: Pushes) -> ForceTiming:
     """Return the times of a pair of LS-DYNA switch sets that makes parts rigid in the planned windows.
 
-    The switch makes parts rigid when no force has acted for the wait (the force-free time that shows a flight), and
+    The switch makes parts rigid when no force has acted for the wait (the force-free time after which it switches), and
     deformable shortly before the next force. OFFSET is the distance that the parts fly from td of the first window to
     the contact after it.
 

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 # Number of engine files in which the OpenRadioss starter reads /RBODY/OFF.
 _MOST_LEGS: Final = 9
-# Ratio of the force-free time that shows a flight to the largest time step while parts are rigid [-].
+# Ratio of the force-free time after which a flight is detected to the largest time step of rigid parts [-].
 # With this time-step limit, a contact is detected at most one time step late.
 _STEPS_PER_WAIT: Final = 300
 # Ratio of the required force-free time to the time for which LS-DYNA ignores contacts after a switch [-].
@@ -100,7 +100,7 @@ def print_first_run_cards(
     parts : sequence of int
         Parts to be switched.
     wait : float
-        Force-free time that shows a flight [time].
+        Force-free time after which a flight is detected [time].
     reason : str
         Origin of this time.
     after : float or None
@@ -132,7 +132,7 @@ def _print_radioss_cards(
     reason: str,
     after: float | None,
 ) -> PrintedCard:
-    """Print the engine files and sensors of a Radioss run; raise DeckError unless contact forces reveal a flight."""
+    """Print the engine files and sensors of a Radioss run; raise DeckError if the deck has no contact or rigid wall."""
     run, bodies = read_run(path), find_bodies(path, parts)
     if run.starter is None or len(run.legs) != 1:
         raise DeckError(
@@ -172,7 +172,7 @@ def _print_radioss_cards(
 
 
 def _explain_wait(wait: float, reason: str) -> str:
-    """Return the note on the force-free time that shows a flight."""
+    """Return the note that states how long no force must act until a flight is detected, and why."""
     return f"force-free time that marks a flight: {wait:.4g}; {reason}"
 
 
@@ -187,7 +187,7 @@ def _print_ls_dyna_cards(
     reason: str,
     after: float | None,
 ) -> PrintedCard:
-    """Print the switch sets of an LS-DYNA run; raise DeckError unless the force of one contact reveals a flight."""
+    """Print the switch sets of an LS-DYNA run; raise DeckError unless exactly one contact can trigger the switches."""
     deck = read_deck(path)
     contact, keyword = _find_contact(path, deck)
     part_ids = check_ids(parts)

@@ -1,4 +1,4 @@
-"""Evaluate switches by a force (LS-DYNA's CODE 1 to 4) for known contact times.
+"""Evaluate force-triggered switches (LS-DYNA's CODE 1 to 4) for known contact times.
 
 Source: the vendor's keyword data as published in its Python library. A set switches between TIME1 and TIME2 when the
 force of its contact or wall is zero (CODE 1, 2) or not zero (CODE 3, 4). The sets of a pair act in turn, beginning with

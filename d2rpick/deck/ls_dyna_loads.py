@@ -197,7 +197,7 @@ def _read_node_supports(numbers: Places, codes: Places) -> Iterator[Hold]:
 
 
 def _read_plane_support(card: Card, numbers: Places, coordinates: Reals) -> Hold | str:
-    """Return the support of those nodes that lie on the plane that a *CONSTRAINED_GLOBAL fixes."""
+    """Return the support of the nodes on the plane of a *CONSTRAINED_GLOBAL card, or a note if these are unknown."""
     rows = card.lines
     if rows:
         code, normal = (

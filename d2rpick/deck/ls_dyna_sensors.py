@@ -84,7 +84,7 @@ def read_controls(deck: Deck) -> Iterator[Control]:
 def follow_control(
     deck: Deck, control: Control, forces: Forces | None, end: float
 ) -> list[Change] | str:
-    """Return the states of a control from the start of a run to its end.
+    """Return the times at which a sensor control changes its state during a run, or the reason why they are unknown.
 
     Parameters
     ----------

@@ -111,7 +111,7 @@ class Boundary(NamedTuple):
         )
 
     def placed(self, table: NodeTable) -> Boundary:
-        """Return the same boundary with node indices in place of node ids."""
+        """Return the same supports, motions and gravity with node indices in place of node ids."""
         return Boundary(
             place_nodes(self.holds, table),
             self.gravity and place_nodes(self.gravity, table),

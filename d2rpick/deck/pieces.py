@@ -239,11 +239,11 @@ def _is_plane(heights: NDArray[np.float64], fixed: Mask, tolerance: float) -> bo
 
 # The code below computes the longest period of connected pieces that oscillate on springs.
 # A piece without inner springs has mass m, and its springs connect it to pieces of total mass M.
-# The reduced mass of a piece of mass m on springs to pieces of total mass M is mu = m M/(m + M).
+# The reduced mass of a piece of mass m whose springs connect it to pieces of total mass M is mu = m M/(m + M).
 # A spring of stiffness k along the unit vector l adds k l l^T to the stiffness matrix K of the piece.
 # The period of a piece along an eigenvector of K with eigenvalue lambda is 2 pi (mu/lambda)^(1/2).
 # A load is transmitted in the stiffest direction first, so the largest eigenvalue of K determines the period.
-# If the trace of K replaces the eigenvalue in the formula for the period, the result is a lower bound on all periods.
+# With the trace of K in place of lambda, this formula gives a lower bound on all periods.
 
 
 class InnerPeriod(NamedTuple):

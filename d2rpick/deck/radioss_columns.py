@@ -34,7 +34,7 @@ RIGID_PART: Final = DataLine(integers("node_ID"), blank(40), integers("sens_ID")
 
 MERGE: Final = DataLine(integers("main_ID M_type secon_ID S_type"))
 NODE: Final = DataLine(integers("node_ID"), reals("X Y Z", _REAL))
-# Line of ids in /GRNOD, /SUBSET and /SURF/PART; it also fits the first id of /TH/NODE and /INIVEL/NODE.
+# Line of ids in /GRNOD, /SUBSET and /SURF/PART; the first field is also that of the id in /TH/NODE and /INIVEL/NODE.
 # In /TH/NODE, the second number is the skew system.
 ID_LIST: Final = DataLine(integers("ID1 ID2 ID3 ID4 ID5 ID6 ID7 ID8 ID9 ID10"))
 

@@ -288,7 +288,7 @@ def _check_velocities(
 
 
 def _read_moved_nodes(card: Card) -> tuple[int, frozenset[int]]:
-    """Return the node group of an /INIVEL or the nodes that it lists; both are empty if it sets nothing in motion."""
+    """Return the node group or the listed nodes of an /INIVEL card; both are empty if the card moves no nodes."""
     kind = "".join(card.name.split("/")[1:2])
     rows = card.rows[1:]
     if kind == "NODE":

@@ -480,7 +480,7 @@ def _find_support(card: Card, rows: Sequence[Row]) -> model.Hold | None:
 
 
 def _find_motion(card: Card, rows: Sequence[Row]) -> model.Hold:
-    """Read a prescribed motion with its times; with a sensor or units of its own, it is assumed to act at all times."""
+    """Read a prescribed motion with its times; with a sensor or its own units, it is assumed to act at all times."""
     timed = (
         len(rows) > 1
         and not card.integer(rows[0], GRAVITY["sens_ID"]).value

@@ -382,7 +382,7 @@ def _make_window_of_rigid_part(body: Body) -> SwitchWindow:
 def find_rigid_parts(
     starter: Starter, bodies: Mapping[int, int]
 ) -> dict[int, set[int]]:
-    """Return, by body, the parts that the group of the body names or whose nodes all belong to this group.
+    """Return the parts of each rigid body: those that its group names, and those whose nodes all belong to the group.
 
     Parameters
     ----------
@@ -403,7 +403,7 @@ def find_rigid_parts(
         for node in bodies
     }
     all_parts = starter.parts.keys()
-    # Other parts, e.g. a skin, may use only nodes of the named parts.
+    # A body also contains parts whose nodes all belong to its named parts, e.g. a skin.
     incomplete = {
         node: found for node, found in known_members.items() if all_parts - found[1]
     }

@@ -133,12 +133,12 @@ def _read_strain_flags(starter: Starter) -> Mapping[int, int]:
 
 
 def _make_flowing(how: str) -> Unswitchable:
-    """Return the reason for a part whose material flows."""
+    """Return the reason why a part whose material flows through the mesh must not be switched."""
     return Unswitchable(True, f"its material flows through the mesh ({how})")
 
 
 def _make_with_reference(how: str) -> Unswitchable:
-    """Return the reason for a part whose material law has a stress-free reference state."""
+    """Return the reason why a part whose material law has a stress-free reference state must not be switched."""
     return Unswitchable(
         False, f"its law keeps a stress-free reference ({how}), {_GAINS}"
     )

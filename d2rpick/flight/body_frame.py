@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 Displacements = Callable[[Sequence[int]], "NodeMotion | None"]
 
 # Largest deviation of points from their positions in the rotated deck, relative to the size of the body [-].
-# With a larger deviation, the orientation of the body cannot be determined to within 0.1 degrees.
+# If points deviate more, the orientation of the body cannot be determined to within 0.1 degrees.
 _MOST_BENT: Final = 0.05
 # If the connected parts have at least this fraction of the body's mass, they alone define its frame [-].
 _MOST: Final = 0.5

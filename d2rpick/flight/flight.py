@@ -485,7 +485,7 @@ def _limit_to_level(
         driven=isinf(flight.gravity),
     )
     if start is not None and start > flight.start and momenta is not None:
-        # The last sum of energies excludes the work of gravity; the first sum includes it.
+        # The first row contains the sum of energies with the work of gravity, the last row the sum without this work.
         whole = None if damped is None else damped[-1 if flight.gravity else 0]
         if rises_as_it_yields(time, energy, whole, flight.start, start, flight.end):
             start = flight.start

@@ -107,7 +107,7 @@ class Laws:
         window = self._lasting(self._steady, td, self._enough)
         if (
             window and not self._falls_across
-        ):  # A push that briefly balances the weight keeps the momentum constant, too.
+        ):  # A contact force that briefly equals the weight keeps the momentum constant, too.
             return (None if self.is_carried else window), None
         return self._under_gravity(td)
 

@@ -123,7 +123,7 @@ def _select_states(history: History, start: float, stop: int) -> slice:
 
 @remember
 def find_landing_after(history: History, start: float) -> float | None:
-    """Return the first time [time] after ``start`` at which the energy quickly leaves its former range; otherwise None.
+    """Return the first time after ``start`` at which the energy quickly leaves its range so far [time]; otherwise None.
 
     The energy is compared with the first 3/4 of the time since ``start``, and must exceed their band by the band's
     width: no vibration goes so far beyond its range of so long a time.
@@ -272,7 +272,7 @@ def find_settled_time(
     *,
     driven: bool = False,
 ) -> float | None:
-    """Return the time in a window from which on an internal energy keeps its level [time]; None if it still drifts.
+    """Return the time in a window after which the internal energy keeps its level [time]; None if the energy drifts.
 
     Parameters
     ----------

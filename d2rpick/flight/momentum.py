@@ -251,7 +251,7 @@ def find_all_flights(
 
 
 def can_deny_flight(momenta: Momenta) -> bool:
-    """Return True if the chosen parts or the model move enough for their momentum to exclude a flight."""
+    """Return True if the chosen parts or the model move enough for their momentum to rule out a flight."""
     change = momenta.change(momenta.chosen)
     return momenta.time.size >= FEWEST and change > VISIBLE * momenta.noise(
         momenta.chosen

@@ -238,7 +238,7 @@ def integrate_displacements(
 def _compute_offsets(
     time: Samples, ways: Samples, mass: Samples, moving: Sequence[int], rate: Samples
 ) -> Samples:
-    """Return how far each moving part displaces the others if nothing else flies, shape (n, moving, 3) [length]."""
+    """Return how far each moving part displaces all others if nothing else flies, shape (n, moving, 3) [length]."""
     frame_parts = np.setdiff1d(np.arange(mass.size), moving)
     shares = mass[list(moving), np.newaxis] / mass.sum()
     against = (

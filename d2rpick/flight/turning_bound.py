@@ -95,7 +95,7 @@ def _compute_largest_factor(
     inverse_inertia = np.linalg.pinv(inertia, hermitian=True)
     arms = placement.find_nodes(parts) - home
     crossed = np.cross(arms[:, np.newaxis], np.eye(3))
-    # For each node, the maximum over all n is the largest eigenvalue of the matrix of the quadratic form in n.
+    # For a node r, the largest (r x n) I^-1 (r x n) over all n is the largest eigenvalue of its matrix in n.
     matrices = np.einsum("nai,ij,nbj->nab", crossed, inverse_inertia, crossed)
     factors = np.linalg.eigvalsh(matrices)
     return float(factors[:, -1].max())

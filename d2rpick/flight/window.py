@@ -318,7 +318,7 @@ def _tighten_window(
 def _cut_off_hidden_push(
     law: Law, window: tuple[int, int], room: float
 ) -> tuple[int, int]:
-    """Cut off the ends of a window if the tolerance ``room`` may hide the last part of a push in them.
+    """Cut off the ends of a window if the tolerance ``room`` may hide a fading force in them.
 
     The deviation of a smoothly fading push falls with the square of its remaining time: from 4 times the room to the
     room takes as long as from there to its end.  Less than one state cannot be resolved.

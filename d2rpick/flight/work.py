@@ -34,10 +34,10 @@ if TYPE_CHECKING:
 _OWN_ERROR: Final = 1e-3
 # If the work of gravity deviates from a parabola by at most this fraction, damping may be the reason [-].
 _BENT: Final = 1e-2
-# States are used to compute the mass if their squared speed is at least this fraction of the largest one [-].
+# States are used to compute the mass if their squared speed is at least this fraction of the largest [-].
 _SLOW: Final = 1e-2
 # Safety factor on the mass computed from kinetic energy and velocity [-].
-# That mass may be too small, because a table may contain the kinetic energy of only the chosen parts.
+# The computed mass may be too small, because a table may contain the kinetic energy of only the chosen parts.
 # A load that does work like gravity without moving the model would need a much larger mass.
 _MASS_ERROR: Final = 2.0
 # Work up to this fraction of the internal-energy range is treated as zero [-].
@@ -257,7 +257,7 @@ def find_balanced_window(balance: Balance, td: float) -> FreeFlight | None:
     noise = balance.precision.noise(np.stack(terms))
     if noise > _OWN_ERROR * extent:
         return None
-    # The first law is tried before the second, because the second has one more parameter, which could fit a load.
+    # The law without vibration is tried first, because the additional parameter of the other law could fit a load.
     exact, ringing = _make_laws_of_work(balance)
     window = find_lasting_window(exact, td, extent, noise)
     if window is None:
@@ -415,7 +415,7 @@ def _list_terms(balance: Balance) -> list[Samples]:
 
 
 class _Parabola(Law):
-    """Law that energies are parabolas in time, apart from damping, which removes a fraction of the kinetic energy.
+    """Law of parabolic energies over time, except for damping, which removes a fraction of the kinetic energy.
 
     Solvers compute velocities half a step away from positions, which adds the rate of the ``internal`` energy.
     """

@@ -333,7 +333,7 @@ class Scattered(OnDisk):
 
 
 def open_scattered(names: Sequence[str]) -> list[Scattered]:
-    """Return the contents of files that are read at a few offsets, once no write to the files is in progress.
+    """Wait until no file is being written, then return contents that are read from disk at a few offsets.
 
     Raises
     ------

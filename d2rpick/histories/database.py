@@ -44,13 +44,13 @@ DIGITS: Final = {4: 7, 8: 17}
 _LONG = 30.0
 # Number of states whose time steps are compared at a time, so that these states fit into the processor cache.
 _PIECE: Final = 1 << 15
-# Of the times in the coarser database, at least this fraction must occur in another database of the same run [-].
-# A solver writes all databases of a run at its own cycles, even if the output intervals differ.
+# Smallest fraction of the times in the coarser of a run's two databases that must occur in the other database [-].
+# Many times coincide even if the output intervals differ, because a solver writes only at the end of a time step.
 _FEWEST = 0.5
 # Largest difference between the end times of a run's databases [output intervals]; a killed run may lack states.
 _ENDS_APART = 2.0
-# Tolerances by which the internal energy of the parts may exceed the energy of the model.
-# _MORE: tolerance relative to the largest energy of the model [-]; in solver files, less than 0.001 is needed.
+# Tolerances by which the internal energy of the parts may exceed the internal energy of the model.
+# _MORE: tolerance relative to the largest internal energy of the model [-]; in solver files, 0.001 would suffice.
 # _ROUND_OFF: additional tolerance relative to the largest kinetic energy of the model [-].
 _MORE, _ROUND_OFF = 0.1, 1e-6
 

@@ -30,7 +30,7 @@ Record = TypeVar("Record", bound="History | Balance | Momenta")
 
 # Largest energy that is accepted [energy]; the squares of larger energies overflow a double.
 LARGEST_ENERGY: Final = 1e150
-# Parts are treated as at rest up to this fraction of the speed of the fastest part [-]; rounding leaves such speeds.
+# Largest speed that is treated as rest, relative to the speed of the fastest part [-]; it may be a rounding error.
 _STILL: Final = 1e-6
 # Number of times at which the energy is interpolated in one step; it is small to keep the work arrays small.
 _TOGETHER: Final = 1 << 14
@@ -422,7 +422,7 @@ class History:
 
     def check_unit(self, *times: float, argument: str) -> None:
         """Raise RangeError if the times of an ``argument`` seem to have another unit than the record."""
-        # Usually, no time lies below 1/1000 of the record, and no further check is needed.
+        # A time above 1/1000 of the end of the record has the right unit, so no further check is needed.
         if times[-1] * 1e3 > self.time[-1]:
             return
         from d2rpick.histories.digits import ask_for_larger_unit

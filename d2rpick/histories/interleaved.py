@@ -14,9 +14,9 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.history import Samples
 
-# Smallest energy variation between rows that indicates several parts, relative to what noise explains [-].
+# Smallest energy variation between rows that indicates several parts, relative to the variation due to noise [-].
 # Without noise, a single energy varies as much from row to row as from time to time.
-# Noise multiplies the variation from row to row by at most the number of rows per time.
+# Noise multiplies a single energy's variation from row to row by at most the number of rows per time.
 _VARIES_MORE: Final = 3.0
 _MOST_PARTS: Final = 1000
 

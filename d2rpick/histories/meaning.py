@@ -99,7 +99,7 @@ def _list_phrases() -> Iterator[tuple[str, str]]:
 _PHRASES: Final[Mapping[str, str]] = dict(_list_phrases())
 
 
-@lru_cache(maxsize=1 << 16)  # The same names are looked up repeatedly.
+@lru_cache(maxsize=1 << 16)  # The results are cached, because the same names recur.
 def find_meaning(name: str) -> Meaning | None:
     """Return the quantity that a name denotes, with the rank of the match; None if it denotes none or several.
 

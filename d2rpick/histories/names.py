@@ -382,7 +382,9 @@ def _match_piece(
             f"{problem} {list_parts(inside) or 'none'}; choose by a number or title that is one part's only"
         )
     if not inside:
-        raise FormatError(f"{where}: no part {piece}; there are: {list_parts(parts)}")
+        raise FormatError(
+            f"{where}: no part {piece} (expected part ids, not set ids); there are: {list_parts(parts)}"
+        )
     return inside
 
 

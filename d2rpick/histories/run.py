@@ -192,7 +192,7 @@ class OpenedRun:
             )
         )
         if values is None or not values.size:
-            # A database without some of the momenta cannot show which parts fly together.
+            # If the momenta of some parts are missing, the database cannot show which parts fly together.
             return None
         precision = holder.precisions(())[1]
         masses = self._least_masses(values, holder)
@@ -529,12 +529,12 @@ class _Written(Given):
 
     @cached_property
     def not_chosen(self) -> tuple[Part, ...]:
-        """Parts that a table names as left out of its internal energy."""
+        """Parts whose energies a table lists separately, because its internal energy does not include them."""
         database = self._find_table_with_others()
         return find_parts_not_chosen(database) if database else ()
 
     def _find_table_with_others(self) -> Legs | None:
-        """Return the first table that names parts as left out of its internal energy; None if no table does."""
+        """Return the first table that lists parts excluded from its internal energy; None if there is no such table."""
         return next(filter(find_parts_not_chosen, self._run.databases), None)
 
     @cached_property

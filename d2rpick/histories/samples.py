@@ -29,7 +29,8 @@ _STILL: Final = 8 * float(np.finfo(np.float64).eps)
 # Number of halvings of a bracket that are tested together if there are few brackets.
 _HALVED_TOGETHER: Final = 5
 _FEW: Final = 100  # Largest number of brackets that are treated as few.
-HALVINGS: Final = 50  # Number of bisections that narrow a bracket to rounding error
+# Number of bisections that narrow a bracket to the rounding error.
+HALVINGS: Final = 50
 
 
 def find_window(time: Samples, start: float, end: float) -> slice:
@@ -177,10 +178,10 @@ def check_one_run(time: Samples, place: Callable[[int], str]) -> Samples:
 
 
 def _find_wrong_step_back(time: Samples) -> int | None:
-    """Return the first state at which times (n,) step back without being explained by a restart; otherwise None.
+    """Return the first state at which times (n,) decrease although no restart explains it; None if there is none.
 
-    One step back is a restart if it does not go back to the start, and if the interval after it (the first one and
-    the median) is half to twice the median interval before it.
+    A single decrease is a restart if the time does not return to the start, and if the first and the median interval
+    after it are half to twice the median interval before it.
 
     Examples
     --------
@@ -415,7 +416,7 @@ def _insert_middles(times: Samples) -> Samples:
 
 
 class Roots(NamedTuple):
-    """The narrowed brackets: the end ``within`` on the positive side, the other end ``beyond``, and the root ``at``."""
+    """Narrow brackets around roots: end ``within`` on the positive side, other end ``beyond``, and root ``at``."""
 
     within: Samples
     beyond: Samples

@@ -207,7 +207,7 @@ def _list_later_files(name: str) -> Sequence[str]:
     return [os.path.join(folder, sibling) for sibling in in_order]  # noqa: PTH118  pathlib would slow down start-up
 
 
-# Suffixes of decks. A folder with decks but no databases belongs to a run that was not computed yet.
+# Suffixes of decks. A folder with decks but no databases belongs to a run that has not been computed yet.
 _DECKS: Final = (".k", ".key", ".dyn", ".rad")
 
 

@@ -6,10 +6,12 @@ from typing import TYPE_CHECKING
 
 from d2rpick.choice.pair.decision import join_cures
 from d2rpick.choice.pair.grades import GOOD
+from d2rpick.choice.pair.quality import MOST_WORTH_OF_FAIR
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
+    from d2rpick.choice.pair.aftermath import Worth
     from d2rpick.choice.pair.candidates import Candidate
     from d2rpick.choice.pair.decision import Decision
     from d2rpick.choice.pair.quality import Grade
@@ -39,7 +41,7 @@ def describe_expectation(decision: Decision) -> str:
 
 
 def list_statements(decision: Decision) -> Lines:
-    """Return a sentence on the motion and one on the vibration, without what the verdict already states."""
+    """Return a sentence on the motion and a sentence on the vibration; omit what the verdict already states."""
     motion = decision.quality.motion
     vibration = decision.quality.vibration
     alone = decision.quality.alone
@@ -47,7 +49,7 @@ def list_statements(decision: Decision) -> Lines:
     raised = "" if alone.grade == vibration.grade else f", by itself {alone.grade}"
     share = ""
     if worth:
-        share = f"; the energy of its error is at most {worth.share:.2%} of the energy of the next contact"
+        share = f"; the energy of its error is {_format_worth(worth)}"
     return [
         ("motion", f"{motion.grade}{explain_grade(motion, decision)}"),
         (
@@ -57,13 +59,21 @@ def list_statements(decision: Decision) -> Lines:
     ]
 
 
+def _format_worth(worth: Worth) -> str:
+    """Return the largest energy of the vibration error, relative to the next contact and its limit, as text."""
+    if worth.share <= MOST_WORTH_OF_FAIR:
+        return f"at most {worth.share:.2%} of the energy of the next contact"
+    share = f"up to {worth.share:.0%} of the energy of the next contact"
+    return f"{share} (at most {MOST_WORTH_OF_FAIR:.0%} can be used with care)"
+
+
 def explain_grade(grade: Grade, decision: Decision) -> str:
     """Return why a grade is not better and how to improve it, unless the verdict already states both."""
     causes = [cause for cause in grade.causes if cause.reason not in decision.reason]
     if not causes:
         return ""
     reasons = "; ".join(cause.reason for cause in causes)
-    # A better pair is a cure that the verdict already mentions.
+    # Causes that a better pair removes are omitted, because the verdict already names this pair.
     curable = [
         cause
         for cause in causes

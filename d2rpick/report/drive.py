@@ -17,7 +17,7 @@ _WINDOW: Final = row(
     Field("wait", "number", "force-free time"),
     Field("tr", "number"), Field("td", "number"),
     Field("contact", "number?", "first contact of the rigid body; null if the run ended before a contact"),
-    Field("reason", "text?", "reason why the parts were not switched in this flight; null if they were"),
+    Field("reason", "text?", "reason why the parts were not switched in this flight; null if the parts were switched"),
 )  # fmt: skip
 _LEG: Final = row(
     Field("kind", "text", "load, probe or rigid", lambda leg: leg.order.kind),
@@ -29,7 +29,8 @@ DOCUMENT: Final = Document("d2rpick/drive/1", "Answer of d2rpick drive; times in
     keys.WARNINGS,
     Field("windows", many(_WINDOW)),
     Field("legs", many(_LEG), "engine runs in the order of computation, including the discarded ones"),
-    Field("saved_by_model", "number?", "saved fraction of the CPU time of a deformable run, by the cost model",
+    Field("saved_by_model", "number?", "saved fraction of the CPU time of a deformable run, according to the cost "
+          "model",
           lambda answer: answer.saved[0]),
     Field("saved_by_time", "number?", "saved fraction according to the CPU times of the engine runs",
           lambda answer: answer.saved[1]),

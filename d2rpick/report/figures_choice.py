@@ -109,7 +109,7 @@ _RUN_COLOURS: Final = (
     "#56b4e9",
 )
 _PATTERNS: Final = ("-", "--")
-# Up to this number of runs, all are drawn in colour and named; otherwise, only outliers are.
+# Largest number of runs that are all drawn in colour and named; of more runs, only outliers are coloured and named.
 _NAMED: Final = 10
 _MOST_OUTLIERS: Final = 5
 _GREY: Final = "#808080"
@@ -326,7 +326,7 @@ def draw_plan(plan: RunPlan, *, page: bool = False) -> Figure:
 
 
 def _name_window_kind(row: PlannedFlight) -> str:
-    """Return the verdict on a window that this run supports or, without a verdict, what must be done first."""
+    """Return the verdict on a window that needs no further run first; for any other window, return its status."""
     if row.status == "supported" and row.decision:
         return row.decision.verdict
     return row.status

@@ -78,7 +78,8 @@ _WINDOW: Final = row(
     Field("file", "text"),
     Field("line", _LINE),
     Field("deck", "text"),
-    Field("verdict", maybe(keys.VERDICT), "what to do with the pair; null if no history judges it", later=True),
+    Field("verdict", maybe(keys.VERDICT), "what to do with the pair; null if no history is given to judge it",
+          later=True),
     Field("verdict_reason", "text?", "reason for the verdict, as text", later=True),
     Field("cure", "text?", "how to improve the pair, as text; empty for a good pair", later=True),
 )  # fmt: skip
@@ -128,7 +129,7 @@ def as_table(checks: Checks, display: DisplayOptions) -> str:
 
 
 def _switches_at_unknown_times(result: Checked) -> bool:
-    """Return True if the run itself decides when a deck switches and no history shows when this happened."""
+    """Return True if the switching times of a deck depend on the solution and no history shows them."""
     return result.switches_itself and not result.windows
 
 
@@ -167,9 +168,9 @@ def _name_next_step(checks: Checks) -> str:
     if POOR in grades:
         plan = tables.quote_shell_line(("d2rpick", "plan", *history))
         return f"choose other times with {plan}"
-    folders = {os.path.dirname(result.deck) for result in checks.results}  # noqa: PTH120  as above
-    of_history = {os.path.dirname(file) for file in checks.history}  # noqa: PTH120  as above
-    # A run in the folder of the deck leaves its results there, unless this folder already contains the reference run.
+    folders = {os.path.dirname(result.deck) for result in checks.results}  # noqa: PTH120  a name with a NUL byte has no folder
+    of_history = {os.path.dirname(file) for file in checks.history}  # noqa: PTH120  a name with a NUL byte has no folder
+    # The switched run is expected in the folder of the deck, unless this folder already contains the reference run.
     runs = [] if folders & of_history else [folder or os.curdir for folder in folders]
     switched = tables.make_positional(runs[:1] or [_SOME_RUN])
     line = tables.quote_shell_line(

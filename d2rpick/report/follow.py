@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from d2rpick.running.inner_motion import Wait
     from d2rpick.running.witness import SeenFlight
 
-# Messages of events that never vary.
+# Messages of those events whose message is always the same.
 _MESSAGES: Final = {
     "load": "a force acts",
     "rigid": "parts have become rigid: part data are not used until they deform again",
@@ -30,8 +30,8 @@ _ADVICE: Final = ("switch", "later")
 class Event(NamedTuple):
     """An event: a keyword for scripts, its time, the state at which it was ``seen`` [time], and a sentence.
 
-    ``wait`` is the force-free time that shows a flight [time].  ``left`` is the change in that time, as a share of the
-    largest value.  ``tr`` is the advised time [time].  Each is None if it does not apply to the event.
+    ``wait`` is the force-free time after which a flight is detected [time].  ``left`` is the change in that time, as a
+    share of the largest value.  ``tr`` is the advised time [time].  Each is None if it does not apply to the event.
     """
 
     event: str

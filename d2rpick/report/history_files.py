@@ -119,7 +119,7 @@ def _make_box_table(record: Record) -> Table:
 
 
 def _make_box_glstat(record: Record) -> bytes:
-    """Return a glstat of box and step: energies, work exchanged with the surroundings, and mean velocity.
+    """Return a glstat file of the model with box and step: energies, work of external forces, and mean velocity.
 
     The rigid walls of the model are floor, curb and ground, see `Record`.  Friction on them is part of the contact
     energy and is also listed separately, as in Radioss, since health needs the contact energy without friction.
@@ -142,7 +142,7 @@ def _make_box_glstat(record: Record) -> bytes:
 
 
 def _make_box_matsum(record: Record) -> bytes:
-    """Return a matsum of box and step, whose values follow the rigid-body motion while the box is rigid."""
+    """Return a matsum file with the energies and momenta of the parts box and step."""
     from d2rpick.models.box_run import (
         PARTS,
     )  # Imported here to keep start-up fast.

@@ -80,7 +80,7 @@ FLIGHT: Final = row(
 )
 OSCILLATOR: Final = row(
     Field("omega", "number?"), Field("alpha", "number?"), Field("energy_plastic", "number?"),
-    Field("preload", "number?", "preload as the square root of an energy"),
+    Field("preload", "number?", "square root of the preload energy"),
     Field("misfit", "number?", "rms(E - fit)/std(E) in the fitted interval"),
     Field("source", one_of("identified", "given")),
     Field("describes_record", "flag"),
@@ -246,7 +246,7 @@ EXPECTED: Final = Field("expected", maybe(row(
     Field("ratio", "size?", "mean energy after td divided by the mean energy of the reference run, for the "
                             "recommended tr"),
     Field("ratio_low", "size?", "the same ratio, without static energy"),
-    Field("ratio_at_level", "number", "the same ratio, for a tr with the energy of td"),
+    Field("ratio_at_level", "number", "the same ratio, for a tr at which the energy equals the energy at td"),
 )), "estimates for a vibration of many modes, if the basis is energy")  # fmt: skip
 HEALTH: Final = Field("health", maybe(row(
     Field("hourglass_share", "size?"),
@@ -358,7 +358,7 @@ MECHANICS: Final = row(
     Field("flight", FLIGHT, "free flight"),
     Field("oscillator", maybe(OSCILLATOR), get=_get_oscillator),
     Field("modes", maybe(many(row(*(Field(key, "number") for key in ("omega", "alpha", "vibration_energy_td"))))),
-          "modes of basis modal, sorted by rate; null for other bases", _get_modes),
+          "modes of basis modal, sorted by angular frequency; null for other bases", _get_modes),
     Field("unsigned_parts", _NO_VALUE,
           "deprecated: always null, since parts are not compared one by one", lambda _: None),
 )  # fmt: skip

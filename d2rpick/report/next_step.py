@@ -56,7 +56,7 @@ def needs_deck(history: History, settings: Settings) -> bool:
 
 
 def name_step_to_deck(question: RepeatedQuestion) -> str:
-    """Return the step that writes a copy of the main deck with the cards of a plan, and then runs this copy."""
+    """Return a text with the command that writes a copy of the main deck with the cards of a plan."""
     words = ("--deck", _SOME_DECK, "--write-deck", _FOLDER)
     line = write_command(_allow_deck(question), "plan", *question.times, *words)
     return f"write a copy of the deck with the cards: {line}{_NEEDS_DECK}. Then run the deck in {_FOLDER} from t = 0"
@@ -127,7 +127,7 @@ def name_step_with_pair(
     question: RepeatedQuestion,
     command: str,
 ) -> str:
-    """Return the step with a pair that can be used: to the ``better`` pair or, without one, to the card of the pair."""
+    """Return the next step after a usable pair: judge the ``better`` pair or, if there is none, print the card."""
     if better is not None:
         return name_step_to_better_pair(better, question)
     return name_step_to_card(
@@ -141,13 +141,13 @@ def name_step_with_pair(
 
 
 def name_step_to_better_pair(better: Pair, question: RepeatedQuestion) -> str:
-    """Return the step that judges a better pair."""
+    """Return a text with the command that judges a better pair."""
     line = write_command(question, "suggest", "--td", f"{better.td:.6g}")
     return f"judge the better pair with {line}"
 
 
 def _keep_td(times: Sequence[str]) -> Sequence[str]:
-    """Return the words of ``--td`` or ``--td-window`` among those of the times; empty if neither occurs."""
+    """Return the option ``--td`` or ``--td-window`` and its values from a command line; empty if neither occurs."""
     for name, values in (("--td", 1), ("--td-window", 2)):
         if name in times:
             position = times.index(name)
@@ -192,9 +192,9 @@ def name_step_after_refusal(
     otherwise: str,
     decision: Decision | None = None,
 ) -> str:
-    """Return the step after a pair that cannot be used: to a better pair, to other parts, or ``otherwise``.
+    """Return the step after an unusable pair: judge a better pair or other parts; if there are none, ``otherwise``.
 
-    If the ``decision`` rests on what the record lacks, no other pair helps, so the step is to improve the record.
+    If the ``decision`` shows that every pair of the record is unusable, the next step is to improve the record.
     """
     if decision is not None and decision.better_parts:
         line = write_command(question, "plan", new_parts=decision.better_parts)
@@ -224,7 +224,7 @@ def name_step_after_card(
     *,
     is_separate: bool,
 ) -> str:
-    """Return the step after a card: the check of the ``deck`` with it, or other times if the ``worst`` pair is poor.
+    """Return the next step after a card: check the ``deck`` or, if the ``worst`` pair is unusable, choose other times.
 
     ``is_separate``: each part becomes a rigid body of its own, although they may share nodes.
     """
@@ -243,13 +243,13 @@ def name_step_after_card(
 
 
 def name_step_after_extract(file: str) -> str:
-    """Return the step after the extraction of an energy into a file."""
+    """Return the next step after an energy was extracted into a file."""
     line = quote_shell_line(("d2rpick", "suggest", *make_positional([file])))
     return f"choose times with {line}"
 
 
 def name_step_after_first(folder: str) -> str:
-    """Return the step after a deck that switches itself was written into a folder."""
+    """Return the next step after a deck that chooses its own switching times was written into a folder."""
     files = make_positional([folder])
     check = quote_shell_line(("d2rpick", "check", *files))
     follow = quote_shell_line(("d2rpick", "follow", *files))

@@ -52,7 +52,7 @@ _PART: Final = row(
     Field(
         "energy_max",
         "number?",
-        "highest internal energy; null if some state lacks the value",
+        "highest internal energy; null if a state does not contain the value",
     ),
 )
 _SAMPLING: Final = row(
@@ -68,7 +68,7 @@ DOCUMENT: Final = Document("d2rpick/info/1", "Answer of d2rpick info; times in t
     Field("version", "text", "version of the solver; empty if no file contains it"),
     Field("title", "text"),
     Field("states", maybe(get_kind("integer", minimum=0)),
-          "number of states; null if several columns may be the time. In this case, and for 0 states, the times are "
+          "number of states; null if the time column is ambiguous. In this case, and for 0 states, the times are "
           "null"),
     Field("time_start", "number?"), Field("time_end", "number?"),
     Field("time_unit", "text", "empty if no file contains it"),

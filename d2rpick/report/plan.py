@@ -6,7 +6,7 @@ from math import isinf
 from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.base.errors import list_names, make_printable
-from d2rpick.choice.pair.grades import DO_NOT_USE, USE, USE_WITH_CARE
+from d2rpick.choice.pair.grades import DO_NOT_USE, GOOD, USE, USE_WITH_CARE
 from d2rpick.report import keys, tables
 from d2rpick.report.decision import (
     format_in_full,
@@ -36,6 +36,7 @@ from d2rpick.report.suggestion import describe_given_up_time
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+    from d2rpick.choice.pair.decision import Decision
     from d2rpick.choice.pair.situation import Situation
     from d2rpick.choice.td.plan import PlannedFlight, RunPlan
     from d2rpick.report.formats import DisplayOptions, RepeatedQuestion, WrittenDeck
@@ -59,7 +60,8 @@ _POSITION: Final = (
 # _OUT_OF_PLACE: name of the column with the position error.
 # _SPARE: columns that are omitted first if the table is too wide.
 _OUT_OF_PLACE: Final = "out of place"
-_SPARE: Final = ("margin", "CPU time", _OUT_OF_PLACE, "error")
+# The error is never omitted, because it may decide whether a window of the verdict "use" suits the purpose.
+_SPARE: Final = ("margin", "CPU time", _OUT_OF_PLACE, "rigid for")
 
 
 def _get_time(row: PlannedFlight, at: int) -> float | None:
@@ -203,7 +205,8 @@ DOCUMENT: Final = Document(
         Field(
             "fewest_cycles",
             "integer?",
-            "fewest time steps of the written run, if one largest step holds throughout, as with sensors; else null",
+            "smallest number of time steps of the written run, if the same maximum time step applies to the whole run, "
+            "as with sensors; otherwise null",
         ),
     ),
 )
@@ -215,7 +218,7 @@ def as_table(plan: RunPlan, display: DisplayOptions) -> str:
     if plan.flights:
         known_columns = tables.select_known_columns(*build_flight_table(plan))
         rows = f"\n{tables.as_text(*known_columns, display.width, _SPARE)}\n"
-    below = [*list_verdicts(plan), *list_plan_remarks(plan), *list_reasons(plan)]
+    below = [*_list_judged_energy(plan), *list_flight_remarks(plan)]
     if _OUT_OF_PLACE not in rows.strip().partition("\n")[0]:
         below += _list_position_errors(plan)
     printable = [(name, make_printable(text)) for name, text in below]
@@ -265,7 +268,7 @@ def give_plan_sentence(plan: RunPlan) -> str:
 
 
 def _describe_use(plan: RunPlan) -> str:
-    """Describe how many windows can be used now, how many only with care, and how many planned windows not at all."""
+    """Describe how many windows can be used now, how many only with care, and how many cannot be used."""
     decisions = [(row.number, row.decision) for row in plan.supported if row.decision]
     if len(decisions) == 1:
         number, decision = decisions[0]
@@ -367,12 +370,29 @@ def _name_step_if_flights_are_short(question: RepeatedQuestion) -> str:
 
 
 def list_verdicts(plan: RunPlan) -> list[tuple[str, str]]:
-    """Return why the planned windows are no better and how to improve them, each with the name of its flight."""
+    """Return the verdict, reason and expectation of the planned windows that do not preserve the vibration well.
+
+    A window of the verdict "use" is among them if its vibration error is large, but small beside the next contact.
+    """
     return [
         (f"flight {row.number}", format_in_full(row.decision))
         for row in plan.flights
-        if row.window and row.decision and row.decision.cure
+        if row.window and row.decision and _needs_explanation(row.decision)
     ]
+
+
+def _needs_explanation(decision: Decision) -> bool:
+    """Return True unless the motion and the vibration of a pair are both good by themselves."""
+    return bool(decision.cure) or decision.quality.alone.grade != GOOD
+
+
+def _list_judged_energy(plan: RunPlan) -> list[tuple[str, str]]:
+    """Return a line that names the energy of a plan, if the files show which parts fly but no part was chosen."""
+    flies_by_parts = any(row.flight.by_parts for row in plan.flights)
+    if plan.history.parts or not flies_by_parts:
+        return []
+    energy = make_printable(plan.history.channel)
+    return [("judged", f"{energy}, not that of chosen parts (--part)")]
 
 
 def as_markdown(plan: RunPlan, display: DisplayOptions) -> str:
@@ -380,9 +400,8 @@ def as_markdown(plan: RunPlan, display: DisplayOptions) -> str:
     below = tables.format_as_list(
         (
             *list_next_steps(plan, display.question, display.written_deck),
-            *list_verdicts(plan),
-            *list_plan_remarks(plan),
-            *list_reasons(plan),
+            *_list_judged_energy(plan),
+            *list_flight_remarks(plan),
         )
     )
     return "\n\n".join(
@@ -392,6 +411,13 @@ def as_markdown(plan: RunPlan, display: DisplayOptions) -> str:
             *below,
         ]
     )
+
+
+def list_flight_remarks(plan: RunPlan) -> list[tuple[str, str]]:
+    """Return the verdicts, remarks and reasons of a plan, in the order of the flights; those of the run come last."""
+    remarks = [*list_verdicts(plan), *list_plan_remarks(plan), *list_reasons(plan)]
+    numbers = {f"flight {row.number}": row.number for row in plan.flights}
+    return sorted(remarks, key=lambda remark: numbers.get(remark[0], len(numbers) + 1))
 
 
 def list_reasons(plan: RunPlan) -> list[tuple[str, str]]:

@@ -6,9 +6,11 @@ from collections import Counter
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, Final
 
-from d2rpick.choice.pair.grades import GRADES, POOR, VERDICTS
+from d2rpick.choice.pair.grades import GOOD, GRADES, POOR, VERDICTS
+from d2rpick.choice.pair.quality import grade_residual
 from d2rpick.choice.runs.study import (
     OK,
+    Spread,
     StudyOfRuns,
     StudyRow,
     describe_end_of_record,
@@ -88,41 +90,42 @@ _SHARED: Final = row(
     Field("td", "number?", "given td; null if each run has its own td"),
     Field("td_window", "span?", "range in which each run chose its td"),
     Field("tr", row(*(Field(key, "number?") for key in ("min", "median", "max"))),
-          "Statistics of tr, for the runs that have one.",
+          "statistics of tr, for the runs that have a tr",
           lambda answer: answer.spread or dict.fromkeys(("min", "median", "max"))),
-    Field("agree", "flag?", "True if the intervals from tr_low to tr_high of these runs have a time in common."),
+    Field("agree", "flag?", "true if the intervals from tr_low to tr_high of these runs overlap"),
     Field("common_tr", "number?",
-          "The tr of all runs if they agree. Otherwise the earliest tr that is admissible in every run with status ok "
-          "or none, and within the timing tolerance of each, if there is one.", lambda answer: answer.common.tr),
+          "median of tr, or the time nearest to it within all intervals, if the runs agree. Otherwise the earliest tr "
+          "that is admissible in every run with status ok or none, and within the timing tolerance of each, if there "
+          "is such a tr", lambda answer: answer.common.tr),
     Field("common_verdict", maybe(keys.VERDICT),
-          "What to do with common_tr: the verdict for the worst run, from its own pair and from its error at "
-          "common_tr.",
+          "what to do with common_tr: the verdict for the worst run, from its own pair and from its error at "
+          "common_tr",
           lambda answer: VERDICTS.get(answer.grade), later=True),
-    Field("common_window", "span?", "First and last tr around common_tr that meet the same conditions.",
+    Field("common_window", "span?", "first and last tr around common_tr that meet the same conditions",
           lambda answer: answer.common.window),
-    Field("common_reason", "text?", "Why there is no common_tr.", lambda answer: answer.common.reason),
+    Field("common_reason", "text?", "reason why there is no common_tr", lambda answer: answer.common.reason),
     Field("common_keeps_timing_tolerance", "flag?",
-          "True if no error at common_tr is more than 0.05 larger than the error at the run's own tr; null if there "
-          "is no common_tr.",
+          "true if no error at common_tr is more than 0.05 larger than the error at the run's own tr; null if there "
+          "is no common_tr",
           lambda answer: answer.common.keeps_tolerance),
-    Field("common_errors", many("number?"), "Errors of the runs at common_tr, in the same order; empty if there is no "
-                                            "common_tr.",
+    Field("common_errors", many("number?"), "errors of the runs at common_tr, in the same order; empty if there is no "
+                                            "common_tr",
           lambda answer: answer.common.errors),
 )  # fmt: skip
 _RUNS: Final = Field("runs", many(RUN), get=lambda answer: list(add_errors(answer)))
 _MEANING: Final = (
-    "Answer of d2rpick study; times in the unit of the histories. With -f ndjson each run is a line by $defs/line, the "
-    "last line is by $defs/last."
+    "Answer of d2rpick study; times in the unit of the histories. With -f ndjson each run is a line that follows "
+    "$defs/line; the last line follows $defs/last."
 )
 # Newline-delimited JSON has one line per run, written by `d2rpick.api.studies`, and a last line of common results.
 _CURVE: Final = get_kind(many(many("number")), minItems=2, maxItems=2)
 _LINE: Final = row(
     *RUN.fields,
     Field("acceptable", many(many("span")),
-          "Intervals of admissible tr, and those in which the error is at most 0.05 above that of tr."),
+          "intervals of admissible tr, and intervals in which the error is at most 0.05 above the error at tr"),
     Field("files", many(row(Field("name", "text"), Field("size", "integer"), Field("mtime_ns", "integer")))),
-    Field("asked", "text", "Stands for the options and the version."),
-    Field("curve", _CURVE, "Times and energies of an outline of the record, for a figure."),
+    Field("asked", "text", "hash of the options and the version"),
+    Field("curve", _CURVE, "times and energies of an outline of the record, for a figure"),
     Field("profile", maybe(_CURVE), "Times and errors of admissible tr, straight lines between them."),
     name="line", later=("common_error", "curve", "record_end"), **_JUDGED,
 )  # fmt: skip
@@ -256,17 +259,16 @@ def list_outcome(answer: StudyOfRuns) -> list[tuple[str, str]]:
     common = answer.common
     own_tr = "none"
     if spread:
-        own_tr = f"{spread.min:.6g} to {spread.max:.6g}, median {spread.median:.6g}; "
-        own_tr += (
-            "the intervals overlap" if answer.agree else "the intervals do not overlap"
-        )
+        own_tr = _describe_spread(spread, overlaps=bool(answer.agree))
     heading = "common tr"
     shared = f"none: {common.reason}"
     if common.tr is not None and common.window:
         errors = [error for error in common.errors if error is not None]
         heading = VERDICTS[answer.grade] if answer.grade else heading
         runs = f"{answer.judged} of {format_number_of_runs(len(answer.runs))}"
-        shared = f"common tr = {common.tr:g}, for {runs}, {_name_error(answer)} {_format_error_span(errors)}"
+        # Nothing is common to a single run.
+        name = "tr" if answer.judged == 1 else "common tr"
+        shared = f"{name} = {common.tr:g}, for {runs}, {_name_error(answer)} {_format_error_span(errors)}"
         shared += f"; as good: every tr from {format_window(*common.window)}"
     return [
         (heading, shared),
@@ -277,8 +279,17 @@ def list_outcome(answer: StudyOfRuns) -> list[tuple[str, str]]:
     ]
 
 
+def _describe_spread(spread: Spread, *, overlaps: bool) -> str:
+    """Describe the tr of the runs; several tr also by whether their intervals of accuracy overlap."""
+    if spread.min == spread.max:
+        return f"{spread.median:.6g}"
+    intervals = "overlap" if overlaps else "do not overlap"
+    span = f"{spread.min:.6g} to {spread.max:.6g}, median {spread.median:.6g}"
+    return f"{span}; the intervals {intervals}"
+
+
 def _name_error(answer: StudyOfRuns) -> str:
-    """Return the name of the errors at the common tr, which depend on the basis of the runs."""
+    """Return the name of the errors at the common tr: residual, level error, or error if the runs have both."""
     bases = {row.basis for row in answer.runs if row.judged}
     if "energy" not in bases:
         return "residual"
@@ -325,34 +336,51 @@ def _count_verdicts(answer: StudyOfRuns) -> str:
 
 
 def list_run_reasons(answer: StudyOfRuns) -> list[tuple[str, str]]:
-    """Return, each only once, why the pairs of the runs are no better and how to improve them."""
+    """Return, each only once, why the pairs of the runs are no better and how to improve them.
+
+    The reasons for "use" are among them if the vibration error is large, but small beside the next contact.
+    """
     causes = Counter(
         (row.verdict, row.verdict_reason, row.cure)
         for row in answer.runs
-        if row.cure and row.verdict
+        if row.verdict and (row.cure or _has_large_error(row))
     )
     return [
         (
             "why",
-            f"{verdict} in {format_number_of_runs(count)}: {reason}. To improve: {cure}",
+            f"{verdict} in {format_number_of_runs(count)}: {reason}{f'. To improve: {cure}' if cure else ''}",
         )
         for (verdict, reason, cure), count in causes.most_common(_MOST_REASONS)
     ]
 
 
+def _has_large_error(row: StudyRow) -> bool:
+    """Return True if the residual of a run is too large for a pair that preserves the vibration well."""
+    return row.residual is not None and grade_residual(row.residual) != GOOD
+
+
 def list_next_step(
     answer: StudyOfRuns, question: RepeatedQuestion
 ) -> list[tuple[str, str]]:
-    """Return the next command: to one td for all runs, to the verdict on the common pair, or to the worst run."""
+    """Return the next command: to one td for all runs, to the verdict on the common pair, or to the worst run.
+
+    If every run has a usable pair but no tr is common to all of them, each run can have its own tr.
+    """
     judged = [row for row in answer.runs if row.verdict and row.td is not None]
     if not judged:
         first = RepeatedQuestion(files=question.files[:1])
         return [("next", f"look at the first run with {write_command(first, 'info')}")]
     worst = min(judged, key=lambda row: GRADES.index(row.quality or POOR))
     of_worst = question._replace(files=(worst.source,))
-    if worst.quality == POOR or answer.common.tr is None:
+    if worst.quality == POOR:
         line = write_command(of_worst, "suggest", *question.times)
         step = f"look at the first of the worst runs with {line}"
+    elif len(judged) == 1:
+        line = write_command(of_worst, "suggest", *question.times)
+        step = f"print the cards of the run that was judged as {line} says"
+    elif answer.common.tr is None and answer.td is not None:
+        line = write_command(of_worst, "suggest", *question.times)
+        step = f"give each run its own tr, which its cards contain; for the first, see {line}"
     elif answer.td is None:
         earliest = min(row.td for row in judged if row.td is not None)
         readable = tuple(row.source for row in answer.runs if row.judged)

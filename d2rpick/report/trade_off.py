@@ -213,7 +213,7 @@ def list_costs_of_other_offers(trade_off: TradeOff) -> list[tuple[str, str]]:
 
 
 def _warn_about_refused(offer: Offer) -> str:
-    """Return the verdict in parentheses if the pair of an offer cannot be used; otherwise ""."""
+    """Return the verdict in parentheses if a proposed pair cannot be used; otherwise ""."""
     decision = offer.decision
     refused = decision is not None and decision.verdict == DO_NOT_USE
     return f" ({DO_NOT_USE})" if refused else ""
@@ -301,8 +301,9 @@ DOCUMENT: Final = Document("d2rpick/explore/1", "Answer of d2rpick explore; time
           "td with which the others are compared: the given td, otherwise the td with the largest saving",
           lambda trade_off: trade_off.start and trade_off.start.td),
     Field("step", "number?",
-          "nearest td with at most half of the error at start and at least half of its rigid time: an energy peak, "
-          "otherwise a Pareto-optimal td, otherwise the recommended td if its error is smaller",
+          "nearest energy peak with at most half of the error at start and at least half of its rigid time, or nearest "
+          "Pareto-optimal td with these properties if no peak has them. If there is neither, the recommended td, if "
+          "its error is smaller than at start",
           lambda trade_off: trade_off.step and trade_off.step.td),
     Field("offers", many(OFFER),
           "evenly spaced values of td, the peaks of the energy, the given td and the recommended td, by ascending td"),
@@ -424,7 +425,7 @@ def _number_offer_reasons(offers: Sequence[Offer]) -> dict[str, int]:
 
 
 def _format_verdict(offer: Offer, numbers: Mapping[str, int]) -> str:
-    """Return the verdict on a proposed pair, with the number of its reason."""
+    """Return the verdict on a proposed pair, with the number under which its reason is listed."""
     decision = offer.decision
     return format_with_number(decision, numbers) if decision else "no admissible tr"
 

@@ -258,8 +258,8 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "Check the named line. If it is a load, give its end with --after.",
         ),
         "deck-of-another-model": Explanation(
-            "Most parts of the deck have other titles than the parts of the history, or the deck lacks parts of the "
-            "history, so d2rpick does not use it. The exit code is 1 if you gave the deck with --deck.",
+            "Most parts of the deck have titles that differ from the titles in the history, or the deck lacks parts of "
+            "the history. So d2rpick does not use the deck. The exit code is 1 if you gave the deck with --deck.",
             "Give the deck of this run, or leave out --deck.",
         ),
         "judged-by-whole": Explanation(
@@ -277,8 +277,8 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "Omit --merge to keep them separate.",
         ),
         "moves-apart": Explanation(
-            "A part flies away from the other parts, so nothing holds it. In one rigid body with them, it would move "
-            "wrongly.",
+            "A part flies away from the other parts, so nothing holds it. In one rigid body with them, its motion "
+            "would be wrong.",
             "Leave the part out of --part, or switch it as a separate body.",
         ),
         "no-angle": Explanation(
@@ -320,9 +320,10 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "Compare with a switched run (verify --switched).",
         ),
         "stresses-unturned": Explanation(
-            "Solid elements without a co-rotational stress update keep their stresses unrotated while the body is "
+            "Solid elements without a co-rotational stress update do not rotate their stresses while the body is "
             "rigid. After a large rotation the stresses are wrong (D2R116).",
-            "Use another element formulation for these parts, or leave them deformable if the body rotates much.",
+            "Use another element formulation for these parts, or leave them deformable if the body rotates by a large "
+            "angle.",
         ),
         "ties-not-followed": Explanation(
             "The deck contains ties that d2rpick does not evaluate. Parts that they join must become one rigid body.",

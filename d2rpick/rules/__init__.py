@@ -52,7 +52,7 @@ _FOLLOW: Final = {
     "D2R207": {"D2R205", "D2R206"},
     "D2R206": {"D2R205"},
 }
-# Other rules that report the same field, e.g. a time after the end of the run, by rule.
+# Other rules that report the same mistake in the same field, keyed by rule.
 _FOLLOW_THERE: Final = {"D2R205": {"D2R101"}}
 # Other rules that report a wrong id of the same part, keyed by rule.
 _FOLLOW_OF_PART: Final = {"D2R103": {"D2R106"}}

@@ -158,7 +158,7 @@ class Case:
 
     @cached_property
     def windows(self) -> Windows:
-        """Return the rigid windows of all parts, including switches by a force if the history contains this force."""
+        """Return the rigid windows of all parts, including force-triggered windows if the history shows the force."""
         timed = find_windows(self.sets, self.parts)
         if self.sensed:
             by_sensor: list[tuple[float, SwitchEvent]] = []
@@ -199,7 +199,7 @@ class Case:
 
     @cached_property
     def forced(self) -> tuple[Forced, ...]:
-        """Return the switches by a force with their times in the history; empty if there is no history."""
+        """Return the force-triggered switches with their times in the history; empty if there is no history."""
         if self.judge is None or not any(
             header.code.value in _BY_FORCE for _, header in self.headers
         ):
@@ -216,7 +216,7 @@ class Case:
 
     @cached_property
     def by_condition(self) -> tuple[Forced, ...]:
-        """Return the switches by a force or a sensor, with their windows."""
+        """Return the switches that a force or a sensor triggers, with their windows."""
         if not self.sensed:
             return self.forced
         # Imported here to keep start-up fast.

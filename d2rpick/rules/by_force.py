@@ -41,7 +41,7 @@ _SHORT: Final = 0.1
 
 
 class Forced(NamedTuple):
-    """A switch by a force, or a pair of switches: its windows in the history, and the spans of the force [time].
+    """A force-triggered switch or pair of switches: its windows in the history, and the spans of the force [time].
 
     ``place`` is the card that makes the parts rigid, ``cards`` are the cards of the pair.  ``wait`` is the name of the
     time that delays the next switch (TIME3, or Tdelay of the sensor).  ``source`` names what shows the contacts.
@@ -85,7 +85,7 @@ class _Seen(NamedTuple):
 def follow_forced_switches(
     deck: Deck, events: Sequence[SwitchEvent], judge: HistoryJudge, end: float
 ) -> Iterator[Forced]:
-    """Yield the switches by a force in an LS-DYNA deck, with their windows; none if the history shows no contacts."""
+    """Yield the force-triggered switches of an LS-DYNA deck with their windows; none if the history has no contacts."""
     by_card = {
         event.by: [unit_event for unit_event in events if unit_event.by is event.by]
         for event in events

@@ -101,7 +101,7 @@ class _Flags(NamedTuple):
 
 
 def _find_flags(case: Case, card: SwitchSet) -> _Flags | None:
-    """Return the flags of a card. Restarts have them on *RIGID_DEFORMABLE_CONTROL, and plain cards have none."""
+    """Return the flags of a card or, in a restart, of *RIGID_DEFORMABLE_CONTROL; None if the card has no flags."""
     if card.header:
         nrbf = card.header.nrbf
         ncsf = card.header.ncsf
@@ -341,8 +341,8 @@ def _check_other_constraints(case: Case) -> Iterator[Objection]:
 )
 def _check_separated_joints(case: Case) -> Iterator[Objection]:
     """While NRBF 1 or NCSF 1 deletes a joint, weld or extra nodes, only the rigid body of the parts connects them. The
-    parts separate if they become several rigid bodies, or if one of them stays deformable. A joint may also be held by
-    nodal rigid bodies on the parts, which NRBF 1 deletes. Source: vendor keyword data for NRBF, NCSF and LRB. It is not
+    parts separate if they become several rigid bodies, or if one of them stays deformable. Nodal rigid bodies on
+    the parts may hold the joint; NRBF 1 deletes them too. Source: vendor keyword data for NRBF, NCSF and LRB. It is not
     tested whether the flags act on joints and extra nodes, so the rule only warns.
 
     Fix: Switch all parts and merge them by LRB. If they move relative to each other in the flight, like a door on its

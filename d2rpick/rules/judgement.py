@@ -244,7 +244,7 @@ class HistoryJudge:
             return Judgement()
         verdict = verify_run(reference, tr, td, self.settings)
         if parts and not history.energy.any():
-            # Parts without energy lock in no energy (a note says so), so only the flight limits their times.
+            # Parts without internal energy lock in no energy, so only the flight limits their switching times.
             is_flight_known = verdict.situation.flight.start is not None
             return Judgement(tuple(_judge_flight(verdict)) if is_flight_known else ())
         for caution in verdict.cautions:

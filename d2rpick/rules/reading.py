@@ -323,7 +323,7 @@ def _report_disabled(case: Case) -> Iterator[Objection]:
 @make_rule_decorator(
     "D2R302",
     INFO,
-    "switches without a time of their own: CODE 1-5, restart cards, plain *DEFORMABLE_TO_RIGID",
+    "switches whose card gives no time: CODE 1-5, restart cards, plain *DEFORMABLE_TO_RIGID",
     BOTH,
 )
 def _report_untimed(case: Case) -> Iterator[Objection]:

@@ -176,7 +176,7 @@ def _check_order(case: RunCase) -> Iterator[Objection]:
 @make_rule_decorator(
     "D2R402",
     ERROR,
-    "/RBODY/ON or /RBODY/OFF lists a node that is no main node",
+    "/RBODY/ON or /RBODY/OFF lists a node that is not a main node",
     (RADIOSS,),
 )
 def _check_main_nodes(case: RunCase) -> Iterator[Objection]:
@@ -313,7 +313,7 @@ def _check_on_again(case: RunCase) -> Iterator[Objection]:
     (RADIOSS,),
 )
 def _check_step_limit(case: RunCase) -> Iterator[Objection]:
-    """If nothing deformable is left, the time step grows by 10 % per cycle without limit, and the release at td comes
+    """If nothing deformable is left, the time step grows by 10 % per cycle without limit, and the release at td occurs
     late. /DTIX limits the time step. This rule also reports a limit above 1 % of the rigid window. It reports a missing
     limit only if every element lies in a rigid part. Source: runs computed with OpenRadioss (td was 0.26 ms late).
 
@@ -400,8 +400,8 @@ def _report_flaws(case: RunCase, *, code: str) -> Iterator[Objection]:
 def _check_left_rigid(case: RunCase) -> Iterator[Objection]:
     """A rigid body is active from time 0 unless the first engine file has /RBODY/OFF for it. All its nodes stay rigid
     to the end of the run, for example the wheels of a car if the engine files list only the main node of the car body.
-    A body is reported if it contains whole parts and no history shows whether these deform (D2R409 reports those that
-    do). Source: Altair's help for /RBODY in engine files, and runs computed with OpenRadioss.
+    A body is reported if it contains whole parts and no history shows whether these deform (D2R409 reports bodies
+    whose parts deform). Source: Altair's help for /RBODY in engine files, and runs computed with OpenRadioss.
 
     Fix: Add the main node to the /RBODY/OFF of every engine file. If the body is meant to be rigid, silence the finding
     with a comment.

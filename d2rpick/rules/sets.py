@@ -408,9 +408,10 @@ def _make_delayed_deck(wait: str) -> Example:
 def _check_delay(case: Case) -> Iterator[Objection]:
     """TIME3 is the time after a switch during which the set makes no further switch. A contact force begins and ends
     many times in one impact, so with TIME3 = 0 the parts switch back and forth. In a pair, one of the two sets needs a
-    TIME3 above 0. Source: vendor keyword data for the meaning. A public drop tool reports the repeated switches.
+    TIME3 above 0. Source: the vendor's keyword data define TIME3; a public drop tool reports the
+    repeated switches.
 
-    Fix: Set TIME3 to a time in which the contact settles.
+    Fix: Set TIME3 to a time that is longer than the contact.
     """
     waiting = {
         header.swset.value for _, header in case.headers if header.time3.value > 0
@@ -424,7 +425,7 @@ def _check_delay(case: Case) -> Iterator[Objection]:
             problem = f"TIME3 is 0 with CODE {header.code.value}, so parts may switch back and forth in every contact"
             yield (
                 header.time3.field,
-                f"{problem}; set TIME3 to a time in which the contact settles",
+                f"{problem}; set TIME3 to a time that is longer than the contact",
             )
 
 

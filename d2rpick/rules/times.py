@@ -396,7 +396,7 @@ def _check_units_of_history(case: Case) -> Iterator[Objection]:
 @make_rule_decorator(
     "D2R207",
     ERROR,
-    "the switching times are about 1000 times those of the history, or 1/1000 of them",
+    "the switching times are about 1000 times the times in the history, or 1/1000 of them",
     BOTH,
 )
 def _check_times_of_history(case: Case) -> Iterator[Objection]:
@@ -495,8 +495,8 @@ def _check_quality(case: Case) -> Iterator[Objection]:
     "D2R210", ERROR, "a pair beyond a limit, such as --max-residual", BOTH
 )
 def _check_limits(case: Case) -> Iterator[Objection]:
-    """A limit of a recommendation was given, --max-residual or --max-kinetic-share, and the pair exceeds it, or the
-    history does not show whether it does. d2rpick suggest recommends no pair beyond the same limit.
+    """The pair exceeds a limit that was set with --max-residual or --max-kinetic-share, or the history does not show
+    whether it does. With the same limit, d2rpick suggest does not recommend such a pair.
 
     Fix: Use the pair that the finding names, or one that d2rpick suggest recommends with this limit.
     """

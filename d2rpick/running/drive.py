@@ -17,12 +17,14 @@ from d2rpick.base.files import (
     write_as_a_whole,
 )
 from d2rpick.running.sequence import (
+    PROBE,
     Leg,
     LegFindings,
     Order,
     choose_next_leg,
     collect_joined_legs,
     find_next_window,
+    is_same_run,
 )
 from d2rpick.running.swing import find_swing
 
@@ -135,7 +137,7 @@ class Driver:
             self.at = order
             # An earlier driver may have started the engine run, and the solver may have finished it in the meantime.
             begun = self.journal.records[-1].get("order") == [*order]
-            if not begun or self._find_problem(order):
+            if (not begun or self._find_problem(order)) and not self._take_back(order):
                 self._start(order)
             self._wait_for_end()
             if problem := self._find_problem(order):
@@ -143,6 +145,7 @@ class Driver:
             else:
                 self._end(order)
         self.at = None
+        self.solver.remove_replaced()
 
     def _choose_next(self) -> Order | None:
         """Choose the next engine run. If its restart file is damaged, go back to an intact restart file."""
@@ -160,12 +163,29 @@ class Driver:
         start = legs[-1].order.start
         self.report(f"the last engine run is computed again from {start:.6g}: {reason}")
 
+    def _take_back(self, order: Order) -> bool:
+        """Take back the files of an engine run that a probe has replaced; False if it must be computed."""
+        if not any(is_same_run(leg.order, order) for leg in self.journal.legs):
+            return False
+        self.solver.clear(order.number)
+        self.solver.restore(order.number)
+        if self._find_problem(order):
+            return False
+        self.journal.add("restored", order=order)
+        self.report(
+            f"engine run {order.number}: {order.kind} from {order.start:.6g} to {order.until:.6g}, computed before"
+        )
+        return True
+
     def _start(self, order: Order) -> None:
         """Write the engine file of an engine run and start the engine."""
-        number = order.number
+        number, legs = order.number, self.journal.legs
         self.solver.check_room(number)
+        replaces_a_leg = bool(legs) and legs[-1].order.number == number
+        if order.kind == PROBE and replaces_a_leg and self.journal.has_just_ended:
+            # If the window of the probe is not used, the engine run that it replaces is needed again.
+            self.solver.set_aside(number)
         self.solver.clear(number)
-        legs = self.journal.legs
         already_rigid = order.rigid and len(collect_joined_legs(order, legs)) > 1
         largest_step = _limit_step(order, legs, self.deck.interval)
         text = self.deck.leg(number, order.until, largest_step, frozen=already_rigid)
@@ -230,7 +250,8 @@ class Driver:
         histories = [str(self.solver.history(leg.number)) for leg in joined_legs]
         self.looks.look(histories, _find_longest_wait(legs, first.start))
         findings = find_leg_results(order, self.looks.evidence)
-        cycles, cpu = self.solver.took(number)
+        is_restored = self.journal.records[-1]["event"] == "restored"
+        cycles, cpu = (0, 0.0) if is_restored else self.solver.took(number)
         self.journal.add("ended", order=order, seen=findings, cycles=cycles, cpu=cpu)
         if findings.contact is not None:
             window = find_next_window(self.journal.legs, self.limits)
@@ -240,6 +261,8 @@ class Driver:
         if order.rigid:
             # The restart file from before the window is needed in case the window is not used after all.
             kept_restarts.add(first.number - 1)
+        else:
+            self.solver.remove_replaced()
         self.solver.keep(kept_restarts)
 
 
@@ -336,7 +359,13 @@ class Journal:
     def has_failed(self) -> bool:
         """True if the next engine run has failed before."""
         events = [record["event"] for record in self.records]
-        return [event for event in events if event != "started"][-1:] == ["failed"]
+        begun = ("started", "restored")
+        return [event for event in events if event not in begun][-1:] == ["failed"]
+
+    @property
+    def has_just_ended(self) -> bool:
+        """True if nothing has been done since an engine run ended."""
+        return bool(self.records[-1]["event"] == "ended")
 
     def has(self, event: str) -> bool:
         """Return True if the journal contains a record of the given event."""

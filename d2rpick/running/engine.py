@@ -156,6 +156,7 @@ class Solver:
     def __init__(self, folder: Path, name: str, commands: Commands) -> None:
         self.folder, self.name, self.commands = folder, name, commands
         self._lock_path = folder / ".solver.lock"
+        self._replaced = folder / ".drive.replaced"
         self._process: subprocess.Popen[bytes] | None = None
         self._signal = 0  # Number of the signal that ended the last process, or 0.
 
@@ -169,9 +170,37 @@ class Solver:
 
     def clear(self, number: int) -> None:
         """Remove the files of an earlier engine run with the given number."""
-        for path in self.folder.glob(f"{self.name}_{number:04d}[._]*"):
+        for path in self._find_files(number, self.folder):
             path.unlink()
-        self.history(number).unlink(missing_ok=True)
+
+    def set_aside(self, number: int) -> None:
+        """Move the files of a complete engine run to a folder of their own, because another one gets its number.
+
+        The listing is moved last: while it is there, an earlier driver may have been stopped before the other files.
+        """
+        if not self.ended_well(number):
+            return
+        listing = self.file(number, ".out")
+        others = [
+            path for path in self._find_files(number, self.folder) if path != listing
+        ]
+        self._replaced.mkdir(exist_ok=True)
+        for path in [*others, listing]:
+            path.replace(self._replaced / path.name)
+
+    def restore(self, number: int) -> None:
+        """Move the files of an engine run back that were set aside, if there are any."""
+        for path in self._find_files(number, self._replaced):
+            path.replace(self.folder / path.name)
+
+    def remove_replaced(self) -> None:
+        """Remove the files that were set aside."""
+        shutil.rmtree(self._replaced, ignore_errors=True)
+
+    def _find_files(self, number: int, folder: Path) -> list[Path]:
+        """Return the files of an engine run in a folder: engine file, listings, restart files and history."""
+        files = folder.glob(f"{self.name}_{number:04d}[._]*")
+        return [*files, *folder.glob(self.history(number).name)]
 
     def start(self, program: str, number: int) -> None:
         """Start the solver for an engine run: the starter if ``number`` is 0, otherwise the engine.

@@ -1,4 +1,4 @@
-"""Find the events of a run so far: pushes, flights, contacts, advised switches, and switches to rigid."""
+"""Find the events of a run so far: forces, flights, contacts, advised switching times, and parts that become rigid."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from d2rpick.running.witness import SeenFlight
 
 # Smallest height of the internal energy above its recent minimum at a good tr, relative to its recent range [-].
-# In computed runs, a tr at an energy minimum locked in half of the energy at td, and a tr at a peak 90 % or more.
+# In computed runs, a tr at an energy minimum locked in 50 % of the energy at td, and a tr at a peak at least 90 %.
 _HIGH: Final = 0.75
 
 

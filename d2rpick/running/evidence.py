@@ -52,7 +52,7 @@ class GrowingEvidence:
         self.motion = InnerMotion(of_deck, before)
         # Evidence for each set of parts, and last for the model if its momentum or its contact energy is known.
         self.witnesses: list[GrowingWitness] = []
-        # Evidence that still grows, by its parts; None is the key for the whole model.
+        # Evidence to which states are still appended, keyed by its parts; None is the key for the whole model.
         self._going_on: dict[tuple[Part, ...] | None, GrowingWitness] = {}
         self._first_momenta: Samples | None = None
         self._has_moved, self._largest_momentum = RunningMaximum(), 0.0
@@ -175,7 +175,7 @@ class GrowingEvidence:
         return None if self.motion.is_unfinished(now) else longest
 
     def _stores_no_energy(self, start: float, now: float) -> bool:
-        """Return True if the internal energy in a span is only round-off of the kinetic energy, if that is written."""
+        """Return True if the internal energy in a time span is only a rounding error of the kinetic energy."""
         history = self.history
         internal = np.abs(history.between(start, now)[1]).max()
         balance, kinetic = history.balance, 0.0
@@ -210,7 +210,7 @@ class GrowingEvidence:
         return laws.gravity(states.index(start), len(states) - 1)
 
     def free_since(self, time: float) -> float:
-        """Return the start of the force-free time that lasts until a given time; without states, return that time."""
+        """Return the start of the force-free interval that ends at a given time; without states, return this time."""
         starts = [time]
         for witness in self.witnesses:
             state = int(np.searchsorted(witness.time, time, side="right")) - 1

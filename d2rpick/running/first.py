@@ -40,7 +40,7 @@ def first_card(
     Returns
     -------
     (PrintedCard, Wait)
-        The card, with notes for the user, and its waiting time (the force-free time that shows a flight).
+        The card, with notes for the user, and its waiting time (the force-free time after which a flight is detected).
 
     Raises
     ------

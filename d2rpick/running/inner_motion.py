@@ -1,4 +1,4 @@
-"""Determine the waiting time (the force-free time that shows a flight) from oscillations inside the body.
+"""Determine the waiting time (the force-free time after which a flight is detected) from oscillations inside the body.
 
 The wait is half of the longest inner period.  Inside a load, contacts open and close as parts swing on their springs,
 and the longest gap between them is shorter than that (measured: 13 of 17 ms in a falling box, 14 of 22 ms in a car).  A
@@ -48,7 +48,7 @@ _HEAVY: Final = 0.05
 
 
 class Wait(NamedTuple):
-    """Force-free time that shows a flight [time], with its source and a reason.
+    """Force-free time after which a flight is detected [time], with its source and a reason.
 
     ``source``: "given", "record", "deck" or "at-rest".  ``least`` is a lower bound of half of a period of the deck
     [time]; None if that is the wait itself.
@@ -189,7 +189,7 @@ class InnerMotion:
         self._part_motions: dict[tuple[int, int, int], _Motion] = {}
         self._rest_count = 0
         self._largest_speed, self._largest_energy = RunningMaximum(), RunningMaximum()
-        # Time from which on the motions of the parts are used instead of the energy [time].
+        # Time at which the part motions begin to be used instead of the energy [time].
         self._parts_since = np.inf
         # Longest half period of any part so far; a new entry is added each time it increases.
         self._longest_of_parts = [_Longest(-np.inf)]
@@ -201,7 +201,7 @@ class InnerMotion:
         moving_parts: MovingParts,
         free_since: Callable[[float], float],
     ) -> None:
-        """Append states; ``free_since`` returns when the force-free time that lasts until a given time began [time]."""
+        """Append states; ``free_since`` returns the start of the force-free interval up to a given time [time]."""
         momenta = states.find_momenta(of_parts=True)
         if momenta is not None and momenta.masses is not None:
             swings = self._follow_parts(momenta, momenta.masses, moving_parts)
@@ -242,9 +242,9 @@ class InnerMotion:
         so_far: list[_Longest],
         free_since: Callable[[float], float],
     ) -> None:
-        """Lengthen the waiting time if half periods require it that were neither rotations nor caused by a push.
+        """Lengthen the waiting time if a half period requires it that is neither a rotation nor lengthened by a force.
 
-        A pushed swing counts if there is no deck and this motion has not yet had an unforced oscillation.
+        A half period under a force is used if there is no deck and this motion has not yet oscillated freely.
         """
         for swing in sorted(swings, key=lambda swing: swing.seen_at):
             motion = swing.motion
@@ -265,18 +265,18 @@ class InnerMotion:
             so_far[-1] = longest
 
     def longest(self, now: float) -> Wait | None:
-        """Return the longest half period known at the time ``now`` from the deck or the record so far."""
+        """Return the longest half period at the time ``now``, from the deck or from the record up to ``now``."""
         wait = self._get_longest(now).wait
         if wait is None or wait.time <= self._least_time:
             return self._least
         return wait
 
     def longest_swing(self, now: float) -> float:
-        """Return the longest half period known at the time ``now``, even if a push has lengthened it [time]."""
+        """Return the longest half period measured up to ``now``, even if a force lengthened this half period [time]."""
         return max(self._get_longest(now).swing, self._least_time)
 
     def _get_longest(self, now: float) -> _Longest:
-        """Return the longest half period known at a time: from the parts or, while no part moves, from the energy."""
+        """Return the longest half period up to a time, from part motions or, before any part moves, from the energy."""
         has_parts = self._parts_since <= now
         so_far = self._longest_of_parts if has_parts else self._longest_of_energy
         return so_far[bisect_right(so_far, now, key=lambda longest: longest.since) - 1]

@@ -45,9 +45,9 @@ class Looks:
         self._waits = (wait, wait_of_deck(inventory) if inventory else None)
         self.evidence = GrowingEvidence(*self._waits)
         self.record = GrowingRecord()
-        # Position in each file at which the next read continues; empty if the next read covers all states.
+        # Position in each file at which the next read continues; empty if the next read starts at the first state.
         self.resume_points: dict[str, ResumePoint] = {}
-        # All files of the last read.
+        # Names of all files of the last read.
         self._names: frozenset[str] = frozenset()
 
     def look(self, names: Sequence[str], wait_before: float = 0.0) -> bool:

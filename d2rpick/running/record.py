@@ -95,7 +95,7 @@ class GrowingRecord:
 
 
 def _list_tables(history: History) -> list[Table]:
-    """Return the history itself, each of its momenta, and its balance if it has one."""
+    """Return the history itself, each of its momenta, and its energy balance if it has one."""
     tables: list[Table] = [history, *history.momenta]
     if history.balance:
         tables.append(history.balance)

@@ -1,7 +1,8 @@
 """Choose the next engine run (leg) of a run that chooses its own switching times, from the results so far.
 
 The end of a leg is fixed before the leg begins.  The same command therefore computes the same legs, however fast the
-machine is.  A leg that replaces a discarded one gets its number.
+machine is.  A leg that replaces a discarded one gets its number.  If a probe has replaced a deformable leg and its
+window is not used, that leg follows once more.
 """
 
 from __future__ import annotations
@@ -24,9 +25,9 @@ LOAD, PROBE, RIGID = "load", "probe", "rigid"
 # Times that differ by at most this are treated as equal [output intervals].
 # A history may end one output interval early.
 _STATES: Final = 1.5
-# If only this many engine-run numbers are left, no further flight is switched, so that the run can reach its end.
+# If only this many engine runs are left, no further flight is switched, so that the run can reach its end.
 _KEPT_BACK: Final = 10
-# Shortest deformable engine run in a flight, relative to the force-free time that shows a flight [-].
+# Shortest deformable engine run in a flight, relative to the force-free time after which a flight is detected [-].
 _LEAST: Final = 0.25
 # Length of a deformable engine run while the vibration period is unknown, as a fraction of the run [-].
 _UNKNOWN: Final = 0.02
@@ -39,7 +40,7 @@ _RESTART: Final = 10
 # Shortest flight that is switched, in half periods of the slowest vibration [-].
 # In shorter flights, the frozen vibration shifts the landing too much.
 # After flights of 2.4 and 2.8 half periods, two soft boxes landed 33 ms and 55 ms late.
-# After flights of at least 3.2 half periods, cars and boxes landed within 3.4 ms of the right time.
+# After flights of at least 3.2 half periods, cars and boxes landed at most 3.4 ms too early or too late.
 _SWINGS: Final = 3.0
 # Smallest saving for which a window is worthwhile, relative to the cost of a deformable run [-].
 # Smaller savings do not justify the shift of later landings, which reached 37 ms for two computed boxes.
@@ -150,7 +151,10 @@ class LegFindings(NamedTuple):
 
 
 class Leg(NamedTuple):
-    """A completed engine run, with its number of ``cycles`` and CPU time ``cpu`` [s]; both None without a listing."""
+    """A completed engine run, with its number of ``cycles`` and CPU time ``cpu`` [s]; both None without a listing.
+
+    Both are zero if the engine run was replaced by a probe and then taken back instead of being computed again.
+    """
 
     order: Order
     findings: LegFindings
@@ -216,7 +220,7 @@ def _starts_window(last: Order, findings: LegFindings, limits: Limits) -> bool:
 
 
 def _order_load(last: Order, findings: LegFindings, limits: Limits) -> Order:
-    """Schedule a deformable engine run that ends once a current or past flight has lasted for the required time.
+    """Schedule a deformable engine run that is long enough to detect a flight that starts now or has already started.
 
     The flight in which a window ends is not switched again.
     """
@@ -258,8 +262,11 @@ def _return_before_contact(legs: Sequence[Leg], limits: Limits) -> Order:
     orders = collect_joined_legs(legs[-1].order, legs)
     findings = get_flight_findings(legs)
     if window.reason:
+        switch_after = window.tr + limits.same
+        if replaced := find_replaced_leg(orders[0], legs):
+            return replaced.order._replace(switch_after=switch_after)
         load = _order_load(orders[0].undone(), findings, limits)
-        return load._replace(switch_after=window.tr + limits.same)
+        return load._replace(switch_after=switch_after)
     orders_before = [order for order in orders if order.until <= window.td]
     if not orders_before:
         return orders[0]._replace(kind=RIGID, until=window.td)
@@ -304,9 +311,14 @@ def _explain_too_little_saved(
     """
     if td <= tr:
         return "its margin begins before tr"
-    deformable_legs = [leg for leg in legs if not leg.order.rigid and leg.cycles]
-    length = sum(leg.length for leg in deformable_legs)
-    cycles = sum(leg.cycles or 0 for leg in deformable_legs)
+    # An engine run that was taken back counts once, even if it had to be computed again.
+    deformable_legs = {
+        (leg.order.start, leg.order.until): leg
+        for leg in legs
+        if not leg.order.rigid and leg.cycles
+    }
+    length = sum(leg.length for leg in deformable_legs.values())
+    cycles = sum(leg.cycles or 0 for leg in deformable_legs.values())
     cost = 0.0  # The cost is measured in deformable cycles.
     for leg in legs:
         if leg.order.rigid and leg.order.start >= tr:
@@ -315,6 +327,17 @@ def _explain_too_little_saved(
     if saved >= _WORTH:
         return None
     return f"saves {max(saved, 0.0):.1%} of the run, less than {_WORTH:.0%}"
+
+
+def is_same_run(first: Order, second: Order) -> bool:
+    """Return True if two orders describe the same engine run, whichever of its flights may be switched."""
+    return first._replace(switch_after=second.switch_after) == second
+
+
+def find_replaced_leg(probe: Order, legs: Sequence[Leg]) -> Leg | None:
+    """Return the deformable engine run that was replaced when the probe began; None if the probe began at its end."""
+    last_load = next(leg for leg in reversed(legs) if leg.order.kind == LOAD)
+    return last_load if last_load.order.number == probe.number else None
 
 
 def collect_joined_legs(order: Order, legs: Sequence[Leg]) -> list[Order]:
@@ -329,12 +352,12 @@ def collect_joined_legs(order: Order, legs: Sequence[Leg]) -> list[Order]:
 
 
 def get_flight_findings(legs: Sequence[Leg]) -> LegFindings:
-    """Return the findings about the flight that was then switched, at the end of the last deformable engine run."""
+    """Return the findings about the switched flight, as they were at the end of the last deformable engine run."""
     return next(leg.findings for leg in reversed(legs) if leg.order.kind == LOAD)
 
 
 def windows(legs: Sequence[Leg], limits: Limits) -> list[Window]:
-    """Return all flights so far, whether switched or left deformable, in the order of their starts."""
+    """Return all flights so far in order of start time, whether the parts were switched or stayed deformable."""
     by_start: dict[float, Window] = {}
     for count, leg in enumerate(legs, start=1):
         for start, end in leg.findings.short:

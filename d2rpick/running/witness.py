@@ -223,7 +223,7 @@ class GrowingWitness:
         gravity = find_gravity(self, first, state)
         if gravity is None:
             self._test_again_at = state + 1 + int(_TEST_AGAIN * (state - first))
-            # In a flight without gravity, the force-free time may begin in the end of a push.
+            # In a flight without gravity, the force-free time may begin while a contact force is still fading.
             first = find_farthest(
                 state, first, lambda earlier: self.is_constant(earlier, state)
             )

@@ -12,7 +12,13 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.vibration.lines import MOST_GROWTH, PERFECT, Exponentials, Spectrum
+from d2rpick.vibration.lines import (
+    MOST_DECAY,
+    MOST_GROWTH,
+    PERFECT,
+    Exponentials,
+    Spectrum,
+)
 from d2rpick.vibration.locked_lines import ABOVE_SCATTER
 
 if TYPE_CHECKING:
@@ -26,7 +32,7 @@ if TYPE_CHECKING:
 _MOST_STATIC, _LEAST_CHANGE = 1.0, 0.1
 # Number of the strongest lines, each of which may be that of two modes.
 _STRONGEST: Final = 3
-# Two modes describe the record as well if twice the logarithm of the likelihood falls by at most this [-].
+# Two modes describe the record equally well if twice the logarithm of the likelihood falls by at most this [-].
 _AS_WELL: Final = 4.0
 # _MOST_STEPS: largest number of steps of the fit; ten are usual.
 # _CONVERGED: the fit ends with a step that reduces the sum of squares by at most this fraction [-].
@@ -163,10 +169,14 @@ def _differentiate_heights(lines: Exponentials, times: Samples) -> Samples:
 def _move_lines(grid: Grid, lines: Exponentials, step: Samples) -> Spectrum:
     """Return the spectrum of the lines after a step of their parameters, shape (4 k,).
 
-    Lines do not grow by more than the growth that is allowed to lines of modes, because a longer step could overflow.
+    The lines grow and decay no faster than lines of modes may, because a longer step could overflow.
     """
     of_weights, of_poles = step.reshape(2, 2, -1)
-    growth = np.minimum(lines.poles.real + of_poles[0], MOST_GROWTH / grid.span)
+    growth = np.clip(
+        lines.poles.real + of_poles[0],
+        -MOST_DECAY / grid.span,
+        MOST_GROWTH / grid.span,
+    )
     return _fill_mean(
         grid,
         lines._replace(

@@ -150,7 +150,7 @@ def _take_few(s: Samples, e: Samples, most: int = COARSE) -> tuple[Samples, Samp
 def refine(
     starts: Sequence[Samples], model: Model, s: Samples, e: Samples, worst: float
 ) -> Samples | None:
-    """Refine the starting values and return the best fit; None if each leaves more than ``worst`` of the variance."""
+    """Refine the starting values; return the best fit, or None if it leaves more than ``worst`` of the variance."""
     variance = float(np.sum((e - np.mean(e)) ** 2))
     best = None
     least_cost = worst * variance
@@ -364,7 +364,7 @@ def compute_covariance(normal: Samples, rest: Samples) -> Samples:
 
 
 def measure_structure(rest: Samples, deviations: float = _DEVIATIONS) -> float:
-    """Return the rms of the part of ``rest`` that neighbouring values share, in excess of what white noise explains.
+    """Return the rms of the part of ``rest`` that neighbouring values share, beyond the part due to white noise.
 
     The larger value of lags 1 and 2: a vibration sampled four times per period shows only at lag 2.
     """

@@ -52,8 +52,8 @@ _EARLY: Final = 0.25
 # _LEAST_TURNS: smallest number of cycles of a line in the record.
 # _SURE_TURNS: a line with more than this number of cycles cannot be confused with slow changes of the mean.
 # _MOST_DAMPED: largest decay rate of a line, as a fraction of its angular frequency [-].
-# _MOST_DECAY: largest exponent with which a line decays within the record [-].
-_LEAST_TURNS, _SURE_TURNS, _MOST_DAMPED, _MOST_DECAY = 0.25, 1.0, 0.35, 40.0
+# MOST_DECAY: largest exponent with which a line decays within the record [-].
+_LEAST_TURNS, _SURE_TURNS, _MOST_DAMPED, MOST_DECAY = 0.25, 1.0, 0.35, 40.0
 # Largest exponent by which noise may make a vibration seem to grow over the record [-].
 MOST_GROWTH: Final = 0.2
 # _MOST_DECAYS: largest number of decaying exponentials that the mean contains in addition to a constant.
@@ -148,7 +148,7 @@ def make_even_grid(time: Samples, energy: Samples) -> Grid:
 
 
 def _count_turns(time: Samples, values: Samples) -> tuple[float, float]:
-    """Return the number of cycles in times (n,) at the highest relevant frequency, and at the highest strong one."""
+    """Return the numbers of cycles that the highest relevant and highest strong frequencies complete in times (n,)."""
     reach = time - time[0]
     trend = np.polyval(np.polyfit(reach, values, 2), reach)
     power = np.abs(np.fft.rfft((values - trend) * np.hanning(time.size))) ** 2
@@ -392,7 +392,7 @@ def _split(
     rate = poles.imag
     is_line = are_lines(poles, span)
     is_short_of_line = rate * span < 2 * np.pi * _LEAST_TURNS
-    is_slow = (rate >= 0) & is_short_of_line & (decay * span < _MOST_DECAY)
+    is_slow = (rate >= 0) & is_short_of_line & (decay * span < MOST_DECAY)
     decays = np.concatenate([decay[is_line], decay[is_slow]])
     if not every_decay:
         decays = _few_of(decays, span)
@@ -406,7 +406,7 @@ def are_lines(poles: Complex, span: float) -> NDArray[np.bool_]:
     decay = -poles.real
     has_turned = poles.imag * span > 2 * np.pi * _LEAST_TURNS
     is_weakly_damped = decay < _MOST_DAMPED * poles.imag
-    return np.asarray(has_turned & is_weakly_damped & (decay * span < _MOST_DECAY))
+    return np.asarray(has_turned & is_weakly_damped & (decay * span < MOST_DECAY))
 
 
 def _few_of(decays: Samples, span: float) -> Samples:

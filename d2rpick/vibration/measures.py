@@ -272,12 +272,13 @@ def _leaving(mode: Mode, edges: Samples, wanted: Samples, room: Samples) -> Samp
     Between neighbouring edges q is monotone, so the place lies just before the first edge outside.
     """
     outside = np.abs(mode.deformation(edges) - wanted) > room
-    outside[0] = False  # tr itself counts as inside, even if rounded to outside.
+    # tr itself is inside the band, even if rounding places it outside.
+    outside[0] = False
     first = np.argmax(outside, axis=0)
     column = np.flatnonzero(first > 0)
     inner = edges[first[column] - 1, column]
     outer = edges[first[column], column]
-    # q leaves the band above ``wanted`` if ``side`` is 1, and below if it is -1.
+    # The deformation q leaves the band above ``wanted`` if ``side`` is 1, and below ``wanted`` if ``side`` is -1.
     middle = wanted[column]
     tolerated = room[column]
     side = np.sign(mode.deformation(outer) - middle)

@@ -140,7 +140,7 @@ class Reading:
         return np.clip(free, -bound, bound)
 
     def bound(self, tr: Samples | float, td: Samples | float) -> Samples:
-        """Return the largest product that deformations with these energies can have [energy]."""
+        """Return the largest possible product of deformations with the elastic energies at tr and td [energy]."""
         energies = (np.maximum(self.elastic_energy(t), 0.0) for t in (tr, td))
         at_tr, at_td = energies
         return np.asarray(np.sqrt(at_tr * at_td))

@@ -88,13 +88,13 @@ _SOME_TIMES: Final = 64
 # Effect of unexplained energy on the squared residual, per unexplained fraction of the energy [-].
 # Noise at tr (weight 1) and midway to td (weight 2) adds up to sqrt(5); 1.6 standard deviations bound 90 %.
 _REST_COUNTS: Final = 1.6 * np.sqrt(5)
-# Correlations of neighbouring misfits up to this are treated as noise [standard errors].
+# Correlations of neighbouring misfits up to this value are treated as noise [standard errors].
 _CHANCE: Final = 2.0
 # _DRIFT_COUNTS: effect of a changing mean energy on the squared residual, per relative change in the flight [-].
 # _NEGATIVE_COUNTS: effect of a negative or too small static energy on the squared residual, per relative error [-].
 _DRIFT_COUNTS, _NEGATIVE_COUNTS = 0.35, 1.4
-# _BENT_ALIKE: effect of the second harmonic of a stiffening spring on the squared residual of equal deformations [-].
-# _BENT_ACROSS: additional effect of the second harmonic on the squared residual if the deformations are orthogonal [-].
+# _BENT_ALIKE: error of the squared residual of equal deformations, per second harmonic of a stiffening spring [-].
+# _BENT_ACROSS: additional error, per second harmonic, if the deformations at tr and td are mutually orthogonal [-].
 _BENT_ALIKE, _BENT_ACROSS = 3.0, 5.0
 # Largest possible squared residual, which is that of equal and opposite deformations [-].
 _MOST_OPPOSED: Final = 4.0
@@ -294,7 +294,7 @@ class ModalVibration:
     def _compute_errors(
         self, tr: Samples | float, td: Samples | float
     ) -> tuple[Samples, Samples, Samples]:
-        """Return the error of the squared residual of pairs of times, and how far other readings lower or raise it [-].
+        """Return the error of the squared residual of pairs, and how far other interpretations lower and raise it [-].
 
         Alternatives are other interpretations of the lines, and what the kinetic energy says: each is on one side.
         """
@@ -387,7 +387,8 @@ class ModalVibration:
         """Return the error that widens the error bands of all pairs equally [-]."""
         doubts = self.doubts
         if self.reading.no_static:
-            return doubts.harmonic  # The alternative interpretation already accounts for the error of the mean.
+            # An error of the mean energy is not added, because the band covers the interpretation with static energy.
+            return doubts.harmonic
         badly_predicted = min(doubts.missed / _LITTLE_MISSED, 1.0)
         return (
             _DRIFT_COUNTS * doubts.drift * badly_predicted
@@ -629,7 +630,7 @@ def _read(
 
 
 def _add_hidden_pairs(reading: Reading, systematic: float) -> Reading:
-    """Add to an interpretation the vibration energy without lines that its own modes leave in the mean energy."""
+    """Add to an interpretation the vibration energy that its mean energy contains but its modes do not explain."""
     spectrum = reading.spectrum
     level = reading.level_of_modes(reading.times)
     static = spectrum.mean.at(reading.times) - level / 2

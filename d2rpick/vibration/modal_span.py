@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 _PARTS: Final = 16
 # Starts of the trial windows that extend to the end of the record, as fractions of the record [-].
 _BEGINNINGS: Final = (0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75)
-# A record leaves its modes if mean energies over part of the shortest period deviate from the predicted ones.
+# A record no longer follows its modes if a mean energy over part of a period deviates from the modes' prediction.
 # _MEANS_PER_PERIOD: number of mean energies that are checked per period of the highest-frequency mode.
 # _MOST_OFF: largest deviation of a mean energy from the modes' prediction, relative to the vibration energy [-].
 # The limit of the deviation is _MOST_OFF or, if larger, ERRORS_OFF standard errors.

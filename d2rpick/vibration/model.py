@@ -49,7 +49,7 @@ _GAP: Final = 10.0
 # Reason why no tr can be trusted if the vibration at td is below the noise.
 SUNK: Final = "the level at td is below the noise of the record"
 _LEFT_OVER = "the oscillator leaves more over than what is known otherwise"
-# Residual of a run without vibration after td [-]; a pair with a larger residual preserves nothing.
+# Residual of a run without vibration after td [-]; a pair with a larger residual preserves no vibration.
 NOTHING_KEPT: Final = 1.0
 # A tr in this last fraction of the time before td saves little time [-].
 NEAR_TD: Final = 0.25
@@ -501,7 +501,7 @@ def describe_energy_at(
 
 
 def _find_aliasing(history: History, fit: Identification) -> tuple[str, ...]:
-    """Return a doubt if the energy oscillates so fast that its states show neither the vibration nor the level."""
+    """Return a warning text if the states are too few per period to show the vibration and the energy level."""
     if fit.mode is None or fit.misfit is None or fit.misfit > MAX_MISFIT:
         return ()
     time, _ = history.between(fit.start, fit.end)

@@ -24,7 +24,8 @@ BLOCK: Final = 8192
 _STEPS = 64
 # Relative rounding error of a double [-].
 _EPS = float(np.finfo(np.float64).eps)
-# Largest energy that may be a solver error, as a fraction of the highest energy [-]; typical errors are 1/10 of it.
+# Largest energy that may be a solver error, as a fraction of the highest energy [-].
+# Typical solver errors are 1e-5 of the highest energy.
 SOLVER_FLOOR: Final = 1e-4
 # Largest deformation that is treated as zero, as a fraction of the amplitude [-].
 _ZERO = 1e-9
@@ -285,7 +286,7 @@ def compute_energy_and_jacobian(
     swing = cosine * cos + sine * sin
     q = preload + swing
     twice = q + q
-    # The array is filled in place, because identification spends most of its time here.
+    # The array is filled in place to save time, because identification spends most of its time here.
     jacobian = np.empty((size, s.size))
     by_rate = np.multiply(twice, s, out=jacobian[0])
     np.multiply(by_rate, swing, out=jacobian[1])

@@ -127,7 +127,7 @@ class OscillatorEnergy(SampledEnergy):
 
     @cached_property
     def sunk(self) -> str | None:
-        """Return a doubt if the vibration at td does not exceed the noise of the record, otherwise None."""
+        """Return why the sign is unknown if the vibration at td does not exceed the noise; otherwise None."""
         start, end = (
             max(self.td - 2 * np.pi / self.mode.omega, self.span.start),
             max(self.td, self.span.start),
@@ -141,7 +141,7 @@ class OscillatorEnergy(SampledEnergy):
             and fit.rms * np.sqrt(self.history.time.size / time.size)
             < _DROWNED * vibration
         ):
-            return None  # Even if all of the misfit were here, it would be too small.
+            return None  # Even the misfit of the whole record would be below the limit.
         scatter = float(np.sqrt(np.mean((energy - self.mode.energy(time)) ** 2)))
         # Both energies may underflow to zero.
         if vibration > 0 and scatter <= _DROWNED * vibration:
@@ -378,7 +378,7 @@ def compute_sampled_reach(
 def compute_fitted_reach(
     history: History, fit: Identification, mode: Mode, times: Samples, td: float
 ) -> Samples:
-    """Return the error of a tr that is computed, like the level, from the fitted oscillator [time].
+    """Return the error of tr if both tr and the energy level at td are computed from the fitted oscillator [time].
 
     The energy error is that of the fitted curve at tr and at td: its standard deviation, due to the scatter of the
     record about it, and the systematic part of the misfit.  Arguments and result are those of

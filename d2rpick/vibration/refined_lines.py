@@ -26,39 +26,40 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
     from d2rpick.vibration.lines import Complex, Grid, Prediction, Spectrum
 
-# Largest number of refinement steps; three are usual.
+# Largest number of refinement steps; three steps are usually enough.
 _MOST_STEPS: Final = 6
-# Fractions of a step that are tried until the misfit falls.
+# Fractions of a full step that are tried in this order until the misfit falls [-].
 _STEP_LENGTHS: Final = (1.0, 0.5, 0.25)
 # The refinement ends if a step raises twice the logarithm of the likelihood by less than this [-].
 _CONVERGED: Final = 0.1
 # Largest factor by which a step may raise the sum of the heights; lines that cancel each other are fitted to noise [-].
 _MOST_INFLATED: Final = 1.1
-# Relative damping of the normal equations, which lines that cannot be told apart would make singular [-].
+# Relative damping of the normal equations, which would be singular if two lines are almost equal [-].
 _DAMPING: Final = 1e-9
 # Largest number of parameters per state of the grid [-].
 _MOST_PARAMETERS: Final = 0.5
-# A line has this number of parameters: two for its weight and two for its pole.
+# Number of parameters of a line: two for its weight and two for its pole.
 _OF_A_LINE: Final = 4
-# A line must raise twice the logarithm of the likelihood by what the Bayesian information criterion demands (Schwarz,
-# Annals of Statistics 6, 1978).  An added line must raise it by this more, since it is chosen from many lines [-].
+# The Bayesian information criterion states by how much a line must raise twice the logarithm of the likelihood.
+# The source of the criterion is Schwarz, Annals of Statistics 6, 1978.
+# An added line must exceed the criterion by this amount, because it is chosen from many possible lines [-].
 _BEYOND_CHOICE: Final = 6.0
-# Lines of the first part are missing if no line of the record has a frequency within this [cycles over the record].
+# Largest frequency difference between a line of the first part and the same line of the record [cycles over record].
 _SAME_LINE: Final = 0.5
-# Exponents by which a line may decay over the record, tried in the search for lines in a misfit [-].
+# Decay exponents over the record that are tried in the search for lines in a misfit [-].
 _DECAYS: Final = (0.0, 2.0, 6.0)
 # Largest exponent by which an added line may decay over the record; a faster decay would fit a few states of a load.
 _MOST_DECAY: Final = 8.0
-# Largest number of lines that are added because they stand out of the misfit.
+# Largest number of lines that are added because the misfit contains them.
 _MOST_OF_REST: Final = 3
 # Number of points per cycle over the record at which the spectrum of a misfit is evaluated.
 _FINER: Final = 2
-# Frequencies up to this are treated as part of the mean [cycles over the record].
+# Lines are searched for only above this frequency; slower changes belong to the mean [cycles over the record].
 _OF_MEAN: Final = 1.0
 
 
 def refine_prediction(grid: Grid, prediction: Prediction) -> Prediction:
-    """Return the prediction after refining the lines of the whole record, if they leave noise and nothing else.
+    """Return the prediction with refined lines of the whole record, if these lines leave only noise as the misfit.
 
     The lines of the first part stay the same, since they only test the others.
     """
@@ -78,13 +79,14 @@ def refine_prediction(grid: Grid, prediction: Prediction) -> Prediction:
             break
         spectrum = extended
     spectrum = _remove_needless_lines(grid, spectrum)
-    # Least squares gives the best lines only if the misfit is noise; lines may also be fitted to the end of a load.
+    # If the remaining misfit is not noise, the refined lines may be fitted to a load that is still ending.
+    # The prediction then keeps its unrefined lines.
     is_noise = measure_structure(spectrum.rest) == 0
     return prediction._replace(spectrum=spectrum) if is_noise else prediction
 
 
 def _refine_spectrum(grid: Grid, spectrum: Spectrum) -> Spectrum:
-    """Reduce the misfit by the Gauss-Newton method; the poles of the mean are kept, the weights follow from the poles.
+    """Reduce the misfit by the Gauss-Newton method, which changes the poles of the lines but not those of the mean.
 
     If no step reduces the misfit, the spectrum is returned as it is.
     """
@@ -119,7 +121,7 @@ def _compute_step_of_poles(grid: Grid, spectrum: Spectrum) -> Complex:
 
 
 def _try_steps(grid: Grid, spectrum: Spectrum, step: Complex) -> Iterator[Spectrum]:
-    """Yield the spectra with a smaller misfit after a full step of the poles, then after shorter ones."""
+    """Yield each spectrum with a smaller misfit, after a full step of the poles and then after shorter steps."""
     for length in _STEP_LENGTHS:
         poles = spectrum.lines.poles + length * step
         growth = np.minimum(poles.real, MOST_GROWTH / grid.span)
@@ -150,7 +152,7 @@ def _list_missing_poles(
 
 
 def _add_line(grid: Grid, spectrum: Spectrum, pole: complex) -> Spectrum | None:
-    """Return the spectrum with a further line, all lines refined; None if the misfit falls by no more than chance."""
+    """Return the spectrum with a further line after refining all lines; None if the line hardly reduces the misfit."""
     poles = np.append(spectrum.lines.poles, pole)
     if not are_lines(poles, grid.span).all():
         return None
@@ -162,7 +164,7 @@ def _add_line(grid: Grid, spectrum: Spectrum, pole: complex) -> Spectrum | None:
 
 
 def _remove_needless_lines(grid: Grid, spectrum: Spectrum) -> Spectrum:
-    """Return the spectrum without the lines that reduce the misfit by no more than chance; one line is kept."""
+    """Return the spectrum without the lines that hardly reduce the misfit; at least one line remains."""
     for rank in range(spectrum.lines.poles.size - 1, 0, -1):
         strongest_first = np.argsort(-np.abs(spectrum.lines.weights))
         is_kept = np.arange(strongest_first.size) != strongest_first[rank]
@@ -174,12 +176,12 @@ def _remove_needless_lines(grid: Grid, spectrum: Spectrum) -> Spectrum:
 
 
 def _get_needed_gain(grid: Grid) -> float:
-    """Return by how much a line must raise twice the logarithm of the likelihood, unless it is added [-]."""
+    """Return by how much a line of the spectrum must raise twice the logarithm of the likelihood [-]."""
     return float(_OF_A_LINE * np.log(grid.time.size))
 
 
 def _compute_gain(spectrum: Spectrum, better: Spectrum) -> float:
-    """Return twice the increase of the logarithm of the likelihood, for a misfit of white noise [-].
+    """Return twice the increase of the logarithm of the likelihood if the misfit is white noise [-].
 
     Each parameter takes a state from those that show what the misfit is.
     """
@@ -190,7 +192,7 @@ def _compute_gain(spectrum: Spectrum, better: Spectrum) -> float:
 
 
 class _Candidate(NamedTuple):
-    """A line that a misfit may contain: its ``pole`` [1/time], and the ``gain`` of adding it as it is [-]."""
+    """A line that a misfit may contain: its ``pole`` [1/time], and the ``gain`` of adding it without refinement [-]."""
 
     pole: complex
     gain: float
@@ -205,7 +207,7 @@ def _find_strongest_in_rest(grid: Grid, rest: Samples) -> _Candidate:
     for decay in _DECAYS:
         course = np.exp(-decay * since_start / grid.span)
         transform = np.fft.rfft(rest * course, _FINER * count)
-        # A wave and its quadrature, each with half of the course's sum of squares, fit independent parts.
+        # Cosine and sine each have half of their envelope's sum of squares, and fit independent parts of the misfit.
         gains = 2 * np.abs(transform) ** 2 / (variance * np.sum(course**2))
         gains[: int(_FINER * _OF_MEAN) + 1] = 0.0
         strongest = int(np.argmax(gains))

@@ -35,7 +35,7 @@ _BEGINNINGS, _ENDS = (0.6, 0.36, 0.22, 0.13), (0.5, 0.25, 0.12)
 # Further trial windows end at these distances before td, as fractions of the time from the start to td [-].
 # Further trial windows are needed if td lies in the next contact.
 _EARLIER_ENDS = (0.1, 0.2, 0.35)
-# Windows begin and end at fixed marks, so that neighbouring td share windows and fits.
+# Windows begin and end at fixed times (marks), so that neighbouring td share windows and fits.
 # Ratio of the distances of successive marks from the start [-].
 _MARKS = 0.87
 # _LEAST_PERIODS: smallest number of periods in a window that an oscillator describes; fewer may fit by chance.
@@ -49,11 +49,11 @@ _MUCH_BETTER = 0.7
 # _STRUCTURES_OFF: limit of the mean error, as a multiple of the systematic misfit [-].
 # _MEANS_PER_PERIOD: number of mean errors per period.
 _SHARE_OFF, ERRORS_OFF, _STRUCTURES_OFF, _MEANS_PER_PERIOD = 0.01, 5.0, 3.0, 25
-# Number of means per energy period that are used to detect a mode in only part of the window.
+# Number of mean errors per energy period that are computed to detect a mode in only part of the window.
 _MEANS_PER_ENERGY_PERIOD = 4
 # An oscillator that describes at least this fraction of the bounds is used for every td in its window [-].
 _MOST_OF_BOUNDS = 0.5
-# Largest number of times that a growing window is fitted again; two are usual.
+# Largest number of times that a growing window is fitted again; two are usually enough.
 MOST_REFITS = 8
 
 # Hidden modes with at most this fraction of the vibration energy are treated as solver errors and ignored [-].
@@ -394,7 +394,7 @@ def _list_windows_around(bounds: Span, td: float, *, whole: bool) -> Iterator[Sp
 
 
 def _mark(bounds: Span, time: float, after: int = 0) -> float:
-    """Return the last mark up to ``time`` or, if ``after`` is 1, the first mark after it; the bounds count as marks."""
+    """Return the last mark up to ``time`` or, if ``after`` is 1, the first mark after it; the bounds are marks."""
     start, end = bounds
     if time <= start:
         return start

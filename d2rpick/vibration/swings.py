@@ -271,7 +271,7 @@ def _extend_lines(time: Samples, x: Samples, y: Samples) -> Samples:
 def _measure_off_line(x: Samples, y: Samples) -> Samples:
     """Return the distance of each of n >= 3 values from the line through its two nearest neighbours."""
     index = np.arange(x.size)
-    # Both neighbours of the first value, and of the last value, lie on the same side.
+    # The two nearest neighbours of the first value both follow it; those of the last value both precede it.
     middle = np.clip(index, 1, x.size - 2)
     is_end = index != middle
     near = np.where(is_end, middle, middle - 1)

@@ -3,6 +3,7 @@
 import os
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -24,13 +25,20 @@ from d2rpick.choice.runs.study import (
     find_repeated_runs,
     judge_run,
     make_failed_row,
+    make_row,
 )
 from d2rpick.histories.opening import Selection
-from d2rpick.report.study import list_outcome, name_target_energy
+from d2rpick.report.formats import RepeatedQuestion
+from d2rpick.report.study import (
+    list_next_step,
+    list_outcome,
+    list_run_reasons,
+    name_target_energy,
+)
 from tests import variants
 from tests.command import BOX, ENERGY, GLSTAT, ROOT
 from tests.computed import locate_stored
-from tests.energies import require
+from tests.energies import make_energy_history, require
 from tests.reading import read_history
 
 ASKED = Question(variants.TD, Settings())
@@ -548,3 +556,67 @@ def test_runs_without_a_tr_and_far_ones_stand_out_the_farthest_first() -> None:
     assert find_outliers(
         [*(make_chosen_row("same", 2.0) for _ in range(9)), other_row]
     ) == (other_row,)
+
+
+def test_the_error_at_the_common_tr_of_a_run_is_its_residual() -> None:
+    # Noise widens the error band of a small residual beyond zero, so the stated residual is the middle of the rest,
+    # which is larger than the error of the deformations alone.
+    record = read_history([locate_stored("chain_referenceT01.gz")])
+    noise = np.random.default_rng(1).standard_normal(record.energy.size)
+    energy = np.abs(record.energy + 0.1 * record.energy.std() * noise)
+    noisy_history = make_energy_history(energy, record.time)
+    answer = suggest_in_history(noisy_history, 0.2066, Settings(after=0.0))
+    best = require(answer.chosen)
+    residual = require(best.residual)
+    (compared,) = answer.situation.errors(np.array([best.tr])).tolist()
+    alone = np.hypot(compared, np.sqrt(require(answer.situation.kinetic_share)))
+    assert residual - alone > 0.005
+    run_row = make_row("noisy", answer)
+    study = compare_rows(0.2066, [run_row])
+    assert study.common.tr == run_row.tr == best.tr
+    assert study.common.errors == pytest.approx((residual,), abs=5e-4)
+    heading = dict(list_outcome(study))[require(run_row.verdict)]
+    assert f"residual {residual:.3f}" in heading
+
+
+def test_runs_that_need_their_own_tr_are_not_called_the_worst() -> None:
+    good: dict[str, Any] = {
+        "quality": "good",
+        "verdict": "use",
+        "verdict_reason": "kept",
+        "cure": "",
+    }
+    rows = [make_study_row(name, (1, 2), **good) for name in ("a.csv", "b.csv")]
+    rows[1] = make_study_row("b.csv", (3, 4), tr=3.5, **good)
+    question = RepeatedQuestion(files=("a.csv", "b.csv"))
+    own_td = compare_rows((5.0, 12.0), rows)
+    assert own_td.common.tr is None
+    ((_, step),) = list_next_step(own_td, question)
+    assert "d2rpick study --td 10 a.csv b.csv" in step
+    ((_, step),) = list_next_step(compare_rows(10.0, rows), question)
+    assert "its own tr" in step
+    assert "worst" not in step
+
+
+def test_a_single_judged_run_has_nothing_in_common_with_others() -> None:
+    rows = [
+        make_study_row("a.csv", (1, 3), quality="good", verdict="use"),
+        StudyRow("b.csv", UNREADABLE, "b.csv: no such file"),
+    ]
+    answer = compare_rows(10.0, rows)
+    lines = dict(list_outcome(answer))
+    assert lines["use"].startswith("tr = 2, for 1 of 2 runs")
+    assert lines["own tr"] == "2"
+    ((_, step),) = list_next_step(answer, RepeatedQuestion(files=("a.csv", "b.csv")))
+    assert "d2rpick suggest a.csv" in step
+
+
+def test_a_large_error_has_its_reason_in_a_study_even_if_it_is_small_beside_the_next_contact() -> (
+    None
+):
+    row = make_study_row("a.csv", (1, 3), quality="good", verdict="use")
+    wrong = replace(row, residual=0.6, verdict_reason="wrong by 60%, but", cure="")
+    assert list_run_reasons(compare_rows(10.0, [wrong])) == [
+        ("why", "use in 1 run: wrong by 60%, but")
+    ]
+    assert not list_run_reasons(compare_rows(10.0, [row]))

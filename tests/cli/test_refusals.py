@@ -160,7 +160,7 @@ suggest --td 0.064 {GLSTAT} --time cycle | no time 'cycle' | leave --time out
 suggest --td 0.064 {ROLLOVER} | {ROLLOVER}: 3 columns | --energy | 'boxIE_J'
 # parts that are not there
 suggest --td 0.37 --part bax {BOX} | no part 'bax' | did you mean | 1 'box', 2 'step', 3 'sled'
-suggest --td 0.37 --part 7 {BOX} | no part 7 | 1 'box', 2 'step', 3 'sled'
+suggest --td 0.37 --part 7 {BOX} | no part 7 (expected part ids, not set ids) | 1 'box', 2 'step', 3 'sled'
 suggest --td 0.37 --part box --flying 7 {BOX} | no part 7 | 1 'box'
 suggest --td 0.37 --part box --energy 1 {BOX} | --energy and --part exclude each other
 plan --part recommended {MATSUM} | --part recommended needs --deck

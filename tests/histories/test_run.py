@@ -168,7 +168,10 @@ def test_a_part_that_only_some_legs_have_is_left_out_and_named() -> None:
     run = open_contents(radioss_th, bytes(first.data), bytes(second.data))
     assert [part.id for part in run.parts] == [1]
     assert "only some restart segments have part 2, which was left out" in run.notes[0]
-    with pytest.raises(FormatError, match="no part 2; there are: 1 'box'"):
+    with pytest.raises(
+        FormatError,
+        match=r"no part 2 \(expected part ids, not set ids\); there are: 1 'box'",
+    ):
         run.history(Selection(parts=("2",)))
 
 

@@ -4,12 +4,13 @@
 of the previous restart segment, writes its own, and prints what OpenRadioss prints.  D2RPICK_FAKE names a fault:
 ``fail`` ends segment 2 with an error, ``hang`` makes segment 2 sleep, ``slow`` delays each state.  ``empty`` and
 ``cut`` leave an incomplete restart file of segment 3 once, as a full disk does; with ``damaged`` it only looks
-complete.
+complete.  ``lost`` removes the files that the driver has set aside.
 """
 
 import math
 import os
 import re
+import shutil
 import sys
 import time
 from pathlib import Path
@@ -79,6 +80,8 @@ def run_engine(deck: Path) -> None:
     )
     if fault == "hang" and number == 2:
         time.sleep(1000)
+    if fault == "lost":
+        shutil.rmtree(".drive.replaced", ignore_errors=True)
     cycles = 0
     with history.open("wb") as stream:
         while step * STEP <= end + 1e-9:

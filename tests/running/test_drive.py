@@ -265,6 +265,56 @@ def test_a_run_goes_back_to_the_last_restart_that_is_whole(
     assert read_histories(tmp_path) == read_histories(whole[0])
 
 
+def test_a_leg_that_a_probe_replaced_is_not_computed_again_if_the_window_is_not_used(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With a margin of half of the run, no window pays off; the leg before the probe is then needed after all."""
+    options = ["--margin", "0.109", "--wait", "0.028"]
+    result = run(*prepare_drive(tmp_path, *options))
+    assert "engine run 4: probe from 0.058 to" in result.stderr
+    assert "engine run 4: load from 0.058 to 0.065, computed before" in result.stderr
+    outcome = json.loads(result.stdout)
+    assert all(window["reason"] for window in outcome["windows"])
+    loads = [leg for leg in outcome["legs"] if leg["kind"] == "load"]
+    # Each deformable engine run counts once, and together they are the run.
+    assert sum(leg["cpu"] for leg in loads) == len(loads)
+    assert sum(leg["length"] for leg in loads) == pytest.approx(END)
+    paths = sorted((tmp_path / "run").glob("stripT??"))
+    joined = open_run([str(path) for path in paths]).databases[0]
+    assert np.diff(joined.time) == pytest.approx(0.001, abs=1e-5)
+    assert not (tmp_path / "run" / ".drive.replaced").exists()
+    # Without the files that were set aside, the leg is computed again; the run stays the same.
+    monkeypatch.setenv("D2RPICK_FAKE", "lost")
+    (again := tmp_path / "again").mkdir()
+    computed = run(*prepare_drive(again, *options))
+    assert "engine run 4: load from 0.058 to 0.065\n" in computed.stderr
+    assert "computed before" not in computed.stderr
+    assert read_histories(again) == read_histories(tmp_path)
+    assert json.loads(computed.stdout)["windows"] == outcome["windows"]
+
+
+def test_files_are_set_aside_and_restored_even_if_a_driver_was_stopped_in_between(
+    tmp_path: Path,
+) -> None:
+    solver = engine.Solver(tmp_path, "strip", engine.Commands())
+    names = ["strip_0004.rad", "strip_0004_0001.rst", "stripT04", "strip_0004.out"]
+    for name in names:
+        put(tmp_path / name, f"{name} NORMAL TERMINATION".encode())
+    aside = tmp_path / ".drive.replaced"
+    aside.mkdir()
+    (tmp_path / names[0]).rename(aside / names[0])  # the driver was stopped here
+    solver.set_aside(4)
+    put(tmp_path / names[0], b"the engine file of the probe")
+    solver.set_aside(4)  # the listing is gone, so all files are there already
+    assert sorted(path.name for path in aside.iterdir()) == sorted(names)
+    solver.clear(4)
+    solver.restore(4)
+    for name in names:
+        assert (tmp_path / name).read_text() == f"{name} NORMAL TERMINATION"
+    solver.remove_replaced()
+    assert not aside.exists()
+
+
 def test_silence_is_measured_by_what_the_solver_writes(tmp_path: Path) -> None:
     solver, then = (
         engine.Solver(tmp_path, "strip", engine.Commands()),

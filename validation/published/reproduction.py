@@ -108,7 +108,7 @@ _FIGURE: Final = row(
     Field("paper", "text", "result in the paper"),
     Field("found", "text", "result computed here"),
     Field("agrees", "flag?", "true if the results agree; null if there is nothing to compare"),
-    Field("verdict", one_of(*VERDICTS), "yes, in part or no; in part: the results agree only roughly, or only partly",
+    Field("verdict", one_of(*VERDICTS), "whether the results agree; in part: only roughly, or only some of them",
           later=True),
 )  # fmt: skip
 DOCUMENT: Final = Document(

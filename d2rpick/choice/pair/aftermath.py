@@ -34,7 +34,7 @@ _KNOWN_WITHIN: Final = 0.1
 # Assumed upper bound of the number of similar modes with random phases, as in a computed car model with 100 modes.
 # The total energy of m modes with random phases has a relative standard deviation of 1/sqrt(8 m).
 _MODES_OUT_OF_STEP: Final = 110
-# Largest deviation of the mean energy after td from its prediction from spectral lines, as a fraction [-].
+# Largest relative deviation of the mean energy after td from the mean energy that spectral lines predict [-].
 _OF_SOLVER: Final = 0.005
 # Smallest number of states needed to determine the fluctuation of the energy.
 _FEWEST_STATES: Final = 8

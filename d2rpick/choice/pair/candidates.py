@@ -229,14 +229,14 @@ class Judged:
 
     @property
     def modal(self) -> NDArray[np.bool_]:
-        """True for each candidate that is judged by the model with many modes, shape (n,)."""
+        """True for each candidate that is judged with the modal model, shape (n,)."""
         return np.array([situation.basis == "modal" for situation in self.situations])[
             self.situation_of
         ]
 
     @property
     def near_td(self) -> NDArray[np.bool_]:
-        """True for each candidate of the model with many modes that saves hardly any time because it is close to td."""
+        """True for each candidate of the modal model that saves little time because it is close to td, shape (n,)."""
         starts = [_get_start_of_flight(situation) for situation in self.situations]
         flown = self.td - np.array(starts)[self.situation_of]
         return np.asarray(self.modal & (self.td - self.moments.tr < NEAR_TD * flown))

@@ -21,6 +21,7 @@ from d2rpick.choice.pair.grades import (
 from d2rpick.choice.pair.quality import (
     CHOOSE_TIMES_IN_FLIGHT,
     MOST_WORTH_OF_FAIR,
+    MOST_WORTH_OF_GOOD,
     grade_pair,
 )
 from d2rpick.vibration.measures import wrong_sign
@@ -170,7 +171,7 @@ class Decision(NamedTuple):
 
     @property
     def is_limited_by_raised_grade(self) -> bool:
-        """True if the vibration grade decides the verdict after it was raised because of a negligible error."""
+        """True if the verdict rests on a vibration grade that was raised because the vibration error is negligible."""
         vibration = self.quality.vibration
         is_raised = self.quality.alone.grade != vibration.grade
         return is_raised and vibration.grade == self.grade
@@ -193,7 +194,7 @@ class Decision(NamedTuple):
         return ", ".join(parts) or "unknown: no model of the vibration fits the record"
 
     def _name_exceeded_limits(self) -> str:
-        """Name the limits of a comparison that a switched run with a usable pair may exceed; empty if it cannot."""
+        """Name the limits of ``verify`` that a switched run may exceed although its pair is usable; empty if none."""
         if self.grade == POOR or self.is_compared or self.mean_energy_bounds is None:
             return ""
         limits = MeanEnergyBounds(MIN_MEAN_ENERGY, 2 - MIN_MEAN_ENERGY)
@@ -247,7 +248,7 @@ class Decision(NamedTuple):
         return join_cures(cause.cure for cause in causes if not cause.needs_other_times)
 
     def specify_cure(self, cause: Cause) -> str:
-        """Return the advice that removes a cause. If the pair is the best of a td range, no other times are advised."""
+        """Return the advice on a cause of the verdict; do not suggest other times for the best pair in a td range."""
         if self.best_of is None or not cause.needs_other_times:
             return cause.cure
         low, high = self.best_of
@@ -334,7 +335,12 @@ def _explain_raised_grade(quality: Quality) -> str:
         return ""
     share = quality.worth.share
     advice = ": use only the motion" if quality.alone.grade == POOR else ""
-    return f", but the energy of this error is at most {share:.2%} of the energy of the next contact{advice}"
+    limit = (
+        MOST_WORTH_OF_GOOD if quality.vibration.grade == GOOD else MOST_WORTH_OF_FAIR
+    )
+    compared = f"at most {share:.2%} of the energy of the next contact"
+    allowed = f"limit for {VERDICTS[quality.vibration.grade]}: {limit:.0%}"
+    return f", but the energy of this error is {compared} ({allowed}){advice}"
 
 
 def format_bounds(bounds: MeanEnergyBounds) -> str:

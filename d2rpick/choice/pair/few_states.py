@@ -22,7 +22,7 @@ _OFTENER: Final = ("d3thdt", "glstat", "matsum", "binout")
 
 
 def warn_about_few_states(situation: Situation) -> Iterator[Caution]:
-    """Yield a warning if a visible period has fewer than 10 states, which do not determine the energy level at td.
+    """Yield a warning if a visible period has fewer than 10 states, too few to determine the energy level at td.
 
     If no period is visible, the output may be too coarse to show any, since a d3plot has a few hundred states at most.
     """

@@ -55,9 +55,9 @@ _MOST_HIDDEN: Final = 0.3
 # The energy is treated as above or below its mean if it deviates by at least this number of standard deviations [-].
 _BAND: Final = 0.25
 # The following limits of the vibration error are explained in docs/explanation/validation-vibration.md.
-# _HARDLY_GOOD: largest vibration-error energy of a good pair, relative to the energy of the next contact [-].
+# MOST_WORTH_OF_GOOD: largest vibration-error energy of a good pair, relative to the energy of the next contact [-].
 # MOST_WORTH_OF_FAIR: largest vibration-error energy of a fair pair, relative to the energy of the next contact [-].
-_HARDLY_GOOD: Final = 0.01
+MOST_WORTH_OF_GOOD: Final = 0.01
 MOST_WORTH_OF_FAIR: Final = 0.05
 # Smallest number of states that resolve a flight; if there are fewer, a shorter output interval is proposed.
 _ENOUGH_STATES: Final = 200
@@ -292,7 +292,7 @@ _UNKNOWN_LOAD: Final = Cause(
     is_of_record=True,
     needs_deck=True,
 )
-# The cause if the deck was given and does not explain the change either.
+# The cause if the user gave the deck, but its loads do not explain the change of momentum or energy.
 _UNKNOWN_LOAD_WITH_DECK: Final = _UNKNOWN_LOAD._replace(
     cure="write the part momenta (LS-DYNA matsum, Radioss /TH/PART)", needs_deck=False
 )
@@ -438,7 +438,7 @@ def _raise_grade_by_worth(alone: Grade, worth: Worth | None) -> Grade:
     """Raise the grade of a vibration whose error hardly matters in the next contact."""
     if worth is None or alone.grade == "good" or worth.share > MOST_WORTH_OF_FAIR:
         return alone
-    if worth.share <= _HARDLY_GOOD:
+    if worth.share <= MOST_WORTH_OF_GOOD:
         return Grade("good")
     return Grade("fair", alone.causes)
 
@@ -487,7 +487,7 @@ def _describe_unknown_direction(situation: Situation) -> Cause:
 
 
 def omit_comparison(quality: Quality) -> Quality:
-    """Return the grades without the advice to compare with a finished switched run, because that has been done."""
+    """Return the grades without the advice to compare with a switched run, for use after this comparison."""
 
     def omit(grade: Grade) -> Grade:
         causes = [

@@ -296,7 +296,7 @@ def examine_td(
     quiet: QuietTime | None = None
     is_given = settings.oscillator is not None or settings.fit_window is not None
     if not (is_shown or _covers_most(history, described) or (described and is_given)):
-        # The quiet time is needed if only the energy shows a flight, or if no fit covers most of the record.
+        # The time without loads is needed if only the energy shows a flight, or if no fit covers most of the record.
         quiet = find_quiet_time(history, td)
         if settings.replay:
             # Imported here to keep start-up fast.
@@ -407,7 +407,7 @@ def _get_quiet_window(history: History, quiet: QuietTime | None) -> Span | None:
 
 
 def _covers_most(history: History, described: Described | None) -> bool:
-    """Return True if a window covers enough of the record that no modes need to be fitted."""
+    """Return True if a window covers so much of the record that no modes need to be fitted."""
     if described is None:
         return False
     record = float(history.time[-1] - history.time[0])

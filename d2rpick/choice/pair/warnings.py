@@ -375,7 +375,7 @@ class Means(NamedTuple):
     mean_after: float
 
     def ratio(self, locked: float) -> float:
-        """Return the mean energy after td relative to the reference run [-] if the energy ``locked`` is locked in."""
+        """Return the mean energy after td, relative to the reference run, for a locked-in energy ``locked`` [-]."""
         return (self.resting + (locked - self.resting) / 2) / self.mean_after
 
     @property

@@ -10,6 +10,7 @@ from d2rpick.choice.pair.candidates import Candidate, Candidates, judge_times
 from d2rpick.choice.pair.warnings import find_largest_energy
 from d2rpick.histories.samples import find_crossings, halve_brackets, merge_times
 from d2rpick.vibration.measures import TOLERATED_GROWTH
+from d2rpick.vibration.model import measure_all
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -280,10 +281,17 @@ def interpolate_error(profile: Samples, time: float) -> float:
 
 
 def _compute_errors(situation: Situation, times: Samples) -> Samples:
-    """Return the residuals or, if only the energy is known, the level errors, in the shape of ``times`` [-]."""
-    return np.asarray(
-        np.sqrt(situation.errors(times) ** 2 + (situation.kinetic_share or 0.0))
-    )
+    """Return the stated residuals or, if only the energy is known, the level errors, in the shape of ``times`` [-].
+
+    The stated residual of a pair allows for the error band of the model, so it may exceed the error that is compared
+    with the tolerance.
+    """
+    if situation.at_rest or not times.size:
+        return np.zeros(times.shape)
+    _, measured = measure_all([situation.vibration], times.ravel(), [0, times.size])
+    compared = np.sqrt(situation.errors(times) ** 2 + (situation.kinetic_share or 0.0))
+    stated = measured["residual"].reshape(times.shape)
+    return np.where(np.isnan(stated), compared, stated)
 
 
 def _is_inside(times: Samples, windows: Samples) -> NDArray[np.bool_]:

@@ -1,1 +1,1 @@
-"""Choose the parts to switch: find which parts may be switched, what they cost, and which sets to compare."""
+"""Choose the parts to switch: find the parts that may be switched, their cost, and the sets to compare."""

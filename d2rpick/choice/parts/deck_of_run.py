@@ -57,7 +57,7 @@ def _is_whole(inventory: Inventory, body: tuple[int, ...]) -> bool:
 def merge_into_one_body(
     parts: Collection[int], bodies: Iterable[RigidBody]
 ) -> RigidBody:
-    """Return the single rigid body of merged parts, whatever ``bodies`` they would otherwise become."""
+    """Return the single rigid body of merged parts, which replaces the ``bodies`` of these parts."""
     # A single part is one connected body only if it has no disconnected pieces.
     whole = len(parts) > 1 or any(body.whole for body in bodies)
     return RigidBody(tuple(sorted(parts)), whole=whole)

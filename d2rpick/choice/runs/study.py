@@ -65,7 +65,7 @@ _ROUNDED: Final = 0.001
 _NOT_REPEATED = ("no-candidate",)
 # A record is complete if it ends no earlier than this fraction of the median end time of all runs [-].
 _WHOLE: Final = 0.99
-# Number of intervals of a drawn curve, of which only the lowest and highest energy are drawn.
+# Number of intervals into which a curve is divided; only the lowest and highest energy of each interval are drawn.
 _STRETCHES = 200
 
 

@@ -28,7 +28,7 @@ _MUCH: Final = 100.0
 
 @remember
 def find_frozen_times(history: History) -> tuple[Times, ...]:
-    """Return the windows in which a vibrating energy stays constant until it falls [time]."""
+    """Return the windows in which the energy is constant, after a vibration and before it falls [time]."""
     energy = history.energy
     limits = np.maximum(
         LAST_DIGIT * np.abs(energy), history.energy_precision.quanta(energy)

@@ -1,4 +1,4 @@
-"""Plan the rigid windows of a run: find times for each flight, and the windows that this reference run supports.
+"""Plan the rigid windows of a run: find times for each flight, and the windows that need no further reference run.
 
 A window in which nothing vibrates locks in no energy and does not move any landing.  A window that locks in energy
 moves the next landing by less than the margin, and later landings by more than any margin.  Therefore one reference
@@ -133,12 +133,12 @@ class RunPlan:
 
     @property
     def supported(self) -> tuple[PlannedFlight, ...]:
-        """Flights with a window that this reference run supports."""
+        """Flights with a window that can be used without a further reference run."""
         return tuple(row for row in self.flights if row.status == "supported")
 
     @property
     def windows(self) -> tuple[Times, ...]:
-        """Pairs (tr, td) of the supported windows [time]."""
+        """Pairs (tr, td) of the windows that can be used without a further reference run [time]."""
         return tuple(row.window for row in self.supported if row.window)
 
     @property
@@ -152,20 +152,20 @@ class RunPlan:
 
     @property
     def next_run(self) -> tuple[Times, ...]:
-        """Pairs (tr, td) of all windows of the next run, used or supported [time]; empty if no window is new.
+        """Pairs (tr, td) of the next run's windows, including those already used [time]; empty if no window is new.
 
-        The next run starts again from the beginning, so it needs both kinds.
+        The next run starts again from the beginning, so it needs the earlier and the new windows.
         """
         return (*self.done, *self.windows) if self.windows else ()
 
     @property
     def rigid_time(self) -> float:
-        """Total length of the supported windows [time]."""
+        """Total length of the windows that can be used without a further reference run [time]."""
         return sum(row.rigid_time or 0.0 for row in self.supported)
 
     @property
     def rigid_fraction(self) -> float:
-        """Fraction of the record for which the supported windows make the parts rigid [-]."""
+        """Fraction of the record that the windows cover that can be used without a further reference run [-]."""
         return self.rigid_time / self.history.duration
 
     @property

@@ -41,7 +41,7 @@ class Group:
     starts: Indices
 
     def chunks(self, width: int) -> Iterator[Group]:
-        """Split the group into subgroups that are so small that one read suffices for ``width`` values per state."""
+        """Split the group into subgroups small enough to read ``width`` values per state in one read."""
         length = max(1, _CHUNK // max(1, width))
         for begin in range(0, self.rows.size, length):
             part = slice(begin, begin + length)

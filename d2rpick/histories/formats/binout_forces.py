@@ -77,7 +77,7 @@ class ForceBranch(Branch):
 
 
 def _join_sides(branch: ForceBranch) -> Iterator[ContactForce]:
-    """Yield one force per contact. The forces on its two sides are opposite, or only one side has a force."""
+    """Yield one force per contact, that on its more loaded side; the other side has the opposite force or none."""
     ids, first = branch.of_each("x_force")
     forces = np.stack(
         [first, *(branch.of_each(f"{axis}_force")[1] for axis in "yz")], axis=2

@@ -35,7 +35,8 @@ _LONGEST: Final = 1 << 22
 _NUMBER: Final = re.compile(
     rb" *([+-]?(?:\d+\.?\d*|\.\d+))(?:[EeDd]?([+-]\d+)|[EeDd](\d+))?"
 )
-_EXACT: Final = 22  # Largest exponent at which a double holds a power of ten exactly.
+# Largest exponent of a power of ten that a double represents exactly.
+_EXACT: Final = 22
 # Bit flags of a negative exponent and of a negative number. The lower bits contain the two exponent digits.
 _SHRINKS, _NEGATIVE = 1 << 8, 1 << 9
 
@@ -206,7 +207,7 @@ def _find_differing_bits(rows: Bytes, example: Bytes) -> Bytes:
 
 
 def _reduce_rows(operation: np.ufunc, rows: Bytes, size: int) -> Bytes:
-    """Combine rows, which hold one or more blocks of ``size`` bytes each, into one block by a bitwise operation."""
+    """Combine rows of one or more blocks of ``size`` bytes into a single block by a bitwise operation."""
     folded = operation.reduce(rows, axis=0).reshape(-1, size)
     return np.asarray(operation.reduce(folded))
 
@@ -354,7 +355,7 @@ def parse_fortran_numbers(fields: NDArray[np.bytes_], decimals: int) -> Samples:
     usual &= np.all(column[: point - 2] == ord(" "), axis=0)
 
     weights = np.array([float(10**exponent) for exponent in range(decimals, -1, -1)])
-    # The mantissas are still exact here.
+    # The mantissas are still exact integers at this point.
     values: Samples = weights @ digits[:-2].astype(np.float64)
     tens, units = digits[-2:]
     scale = (

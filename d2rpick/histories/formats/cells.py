@@ -89,7 +89,7 @@ def is_skipped(line: str) -> bool:
     ['#DIV/0!,1', '-1.5,2']
     """
     if line[:1].isdigit():
-        return False  # Most lines of a table, whose number decides how long this takes.
+        return False  # This test comes first to save time, because most rows begin with a digit.
     line = line.lstrip()
     if not line:
         return True
@@ -139,7 +139,7 @@ def split_columns_of_numbers(
 
 @lru_cache
 def _compile_rows(separator: str, decimal: str, columns: int) -> re.Pattern[str]:
-    """Return the pattern of any number of rows, each ending with a line feed, of ``columns`` plain numbers."""
+    """Return a regular expression for any number of rows of ``columns`` plain numbers, each ending with a line feed."""
     number = _NUMBER[decimal].pattern
     further = f"(?:{re.escape(separator)}{number}){{{columns - 1}}}"
     return re.compile(rf"(?:{number}{further}\n)*+", re.ASCII)

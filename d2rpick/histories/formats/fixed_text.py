@@ -184,10 +184,10 @@ class Blocks(Database):
         )
 
     def find_resume_points(self) -> dict[str, ResumePoint]:
-        """Return the position at which a later read can begin: the newest state with the third-to-last printed time.
+        """Return the offset at which a later read can resume: the last state with the third-to-last distinct time.
 
-        The states after it tell whether the last one is complete, and which of those with the same printed time is the
-        newest.  A last state of which only the needed lines are there, as `admit_rest` takes it, is not complete.
+        The states after this offset show whether the last state is complete, and which of several states with the same
+        printed time is the newest.  A last state that `admit_rest` accepted with only the needed lines is incomplete.
         """
         first, begin, end = self._find(self._begin), self.tail, len(self._data)
         head = self._data[: self.tail if first is None else first]
@@ -350,7 +350,7 @@ class Blocks(Database):
         return position, stride, self._count(position, position, stride)
 
     def _repeated(self, last: Stretch, recent: list[tuple[int, int]]) -> int:
-        """Return the recent example block that the last block of the file resembles; otherwise, this last block."""
+        """Return the offset of a recent block that resembles the last block; if there is none, that of the last."""
         alike = (
             example
             for example, stride in recent

@@ -28,7 +28,7 @@ _PICKLED_NAME: Final = re.compile(rb"^a?V([^\n]*)$", re.MULTILINE)
 _PICKLED_INDEX_NAME: Final = re.compile(
     rb"^s?a?Vindex_name\n(?:p\d+\n)?V([^\n]*)$", re.MULTILINE
 )
-# First characters of the names of groups without histories, e.g. PyTables index trees and MATLAB references.
+# Name prefixes of groups that contain no histories, e.g. PyTables index trees and MATLAB references.
 _BOOKKEEPING: Final = ("_i_", "#")
 _ERF_BLOCK: Final = "/erfblock"
 # Tables without column names are read if they have at most this number of columns.

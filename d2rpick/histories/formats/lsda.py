@@ -358,9 +358,9 @@ class Lsda:
         return None
 
     def _skip(self, previous: int | None, position: int) -> int:
-        """Return the bytes to skip if the records from ``previous`` to ``position`` repeat; store the skipped states.
+        """Return how many bytes can be skipped because they repeat the records before ``position``; store their states.
 
-        The last repetition is left to the walk, which then reads the following records one by one.
+        The last repetition is not skipped, because the records after it must be read one by one.
         """
         if previous is None or not self._alike(previous, position):
             return 0
