@@ -192,7 +192,7 @@ def name_step_after_refusal(
     otherwise: str,
     decision: Decision | None = None,
 ) -> str:
-    """Return the step after a pair that cannot be used: to a better pair, to other parts, or ``otherwise``.
+    """Return the step after an unusable pair: judge a better pair or other parts; if there are none, ``otherwise``.
 
     If the ``decision`` shows that every pair of the record is unusable, the next step is to improve the record.
     """
