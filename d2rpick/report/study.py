@@ -377,7 +377,7 @@ def list_next_step(
         step = f"look at the first of the worst runs with {line}"
     elif len(judged) == 1:
         line = write_command(of_worst, "suggest", *question.times)
-        step = f"print the cards of the run that was judged as {line} says"
+        step = f"look at the run that was judged with {line}"
     elif answer.common.tr is None and answer.td is not None:
         line = write_command(of_worst, "suggest", *question.times)
         step = f"give each run its own tr, which its cards contain; for the first, see {line}"
