@@ -135,20 +135,20 @@ def _narrow_windows(windows: Sequence[Times], history: History) -> tuple[Times, 
 def _list_card_remarks(
     done: Sequence[Times], history: History, verdicts: Sequence[PairVerdict]
 ) -> Iterator[str]:
-    """Yield comments for the card: windows without a verdict, the energy level of the whole model, and the verdicts."""
+    """Yield comments for a card: windows without a verdict, the verdicts, and the parts to which the energy belongs."""
     if done:
         windows = ", ".join(f"{tr:.6g} to {td:.6g}" for tr, td in done)
         yield f"{', '.join(history.source)} was rigid from {windows}: these windows are done and not judged again."
-    if _names_no_part(history) and READERS[history.energy_format].solver:
-        yield "The internal energy is that of the whole model, not of the switched parts alone."
-    elif _names_no_part(history):
-        yield f"The table does not name the parts of the internal energy: it must be {ASSUMED_PARTS}."
     for verdict in verdicts:
         if len(verdicts) > 1:
             which = f" {verdict.candidate.tr:.6g} to {verdict.situation.td:.6g}"
         else:
             which = ""
         yield from _describe_verdict(verdict, which)
+    if _names_no_part(history) and READERS[history.energy_format].solver:
+        yield "The internal energy is that of the whole model, not of the switched parts alone."
+    elif _names_no_part(history):
+        yield f"The table does not name the parts of the internal energy: it must be {ASSUMED_PARTS}."
     cautions = chain.from_iterable(verdict.cautions for verdict in verdicts)
     yield from dict.fromkeys(
         f"{caution.code}: {caution.message}." for caution in cautions
