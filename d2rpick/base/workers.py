@@ -39,6 +39,8 @@ _STARTS = 3
 _DYING = 0.1  # Pause between attempts to start a pool [s], in which the system finishes ending a killed process.
 # Errors that are raised if a process is started after the fork server was killed.
 _NOT_STARTED = (BrokenProcessPool, EOFError, OSError)
+# Filter, in the form of PYTHONWARNINGS, of the warnings that begin with the name of the resource tracker.
+_QUIET_TRACKER = "ignore:resource_tracker:UserWarning"
 # Longest wait for a reply from the scheduler [s].
 _PATIENCE = 10
 
@@ -258,15 +260,30 @@ def start_importing(processes: int, module: str) -> None:
 def _start_server(module: str) -> None:
     """Start the process from which others are forked; an interrupt ends it silently, even during its imports."""
     # Windows has no fork server.
-    from multiprocessing import forkserver, resource_tracker
+    from multiprocessing import forkserver
 
     set_forkserver_preload(["d2rpick.base.interruptible", module])
-    resource_tracker.ensure_running()  # The tracker is started first, because starting it unblocks SIGINT.
+    _start_tracker()  # The tracker is started first, because starting it unblocks SIGINT.
     mask = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
     try:
         forkserver.ensure_running()
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+
+
+def _start_tracker() -> None:
+    """Start the process that deletes the semaphores of a program that was ended, which needs no warning."""
+    from multiprocessing import resource_tracker
+
+    given = os.environ.get("PYTHONWARNINGS")
+    os.environ["PYTHONWARNINGS"] = _QUIET_TRACKER
+    try:
+        resource_tracker.ensure_running()
+    finally:
+        if given is None:
+            del os.environ["PYTHONWARNINGS"]
+        else:
+            os.environ["PYTHONWARNINGS"] = given
 
 
 def choose_farm(processes: int, module: str) -> Farm:

@@ -111,6 +111,48 @@ def test_any_process_may_be_killed_without_a_loss(victim: str, after: int) -> No
     assert process.returncode == 0
 
 
+def test_a_program_that_is_killed_leaves_no_message_of_its_pool() -> None:
+    """Whoever kills the program, the tracker of its semaphores deletes them without a warning."""
+    code = (
+        "import os, signal\n"
+        "from d2rpick.base.workers import Cores\n"
+        "from tests.base.test_workers import square\n"
+        "with Cores(2, 'tests.base.test_workers') as farm:\n"
+        "    next(farm.answers(square, [0] * 12))\n"
+        "    os.kill(os.getpid(), signal.SIGKILL)\n"
+    )
+    with Popen(
+        [sys.executable, "-c", code], cwd=ROOT, stdout=PIPE, stderr=PIPE, text=True
+    ) as process:
+        # The processes of the pool inherit stderr, so this waits until all of them have ended.
+        assert process.communicate(timeout=TIME_LIMIT) == ("", "")
+    assert process.returncode == -signal.SIGKILL
+
+
+def test_a_worker_that_starts_too_late_ends_without_a_traceback() -> None:
+    """The end of the program deletes the semaphores that a worker needs, which may still be starting."""
+    code = (
+        "import d2rpick.base.interruptible\n"
+        "from multiprocessing import get_context\n"
+        "from multiprocessing.context import set_spawning_popen\n"
+        "from types import SimpleNamespace\n"
+        "lock = get_context('spawn').Lock()\n"
+        "set_spawning_popen(SimpleNamespace(duplicate_for_child=int))\n"
+        "state = lock.__getstate__()\n"
+        "set_spawning_popen(None)\n"
+        "lock.__setstate__((*state[:3], '/deleted', *state[4:]))\n"
+    )
+    process = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        timeout=TIME_LIMIT,
+        check=False,
+    )
+    assert (process.returncode, process.stderr) == (1, "")
+
+
 @pytest.mark.parametrize("farm", FARMS)
 def test_items_are_taken_as_there_is_room(farm: Callable[[], Farm]) -> None:
     taken = 0
