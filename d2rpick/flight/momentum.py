@@ -429,7 +429,7 @@ def find_parts_flying_together(run: OpenedRun) -> tuple[Part, ...]:
 
 
 def _list_cores(momenta: Momenta) -> Iterator[tuple[int, ...]]:
-    """Yield the sets of parts attached to the heaviest part at various times, without parts that slide at that time.
+    """For each of several times, yield the parts attached to the heaviest part, except those that slide at this time.
 
     A part that moves straight, such as a sliding loose wheel, bends no sum, and would otherwise pass for a part of the
     body.

@@ -363,7 +363,7 @@ class Off(NamedTuple):
 
 
 class Bodies:
-    """Rigid bodies in a flight with their displacements; a single body is assumed if the deck defines none (``told``).
+    """Rigid bodies in a flight with their displacements; a single body is assumed unless a deck defines them.
 
     If one displacement is unknown the error is unknown too, since it may be the largest.  ``apart`` are parts that are
     to become one body with others but fly away from them, and ``staying`` the other moving parts, if any are apart.

@@ -1,4 +1,4 @@
-"""Evaluate switches by a contact or rigid-wall force with a history that shows when this force acts.
+"""Evaluate switches triggered by a contact or rigid-wall force, with a history that shows when this force acts.
 
 Forces that the solver wrote show when each contact and wall acts.  Momenta show that a force acts on a part, not which
 contact exerts it: with momenta alone a deck with several contacts and walls is not judged.

@@ -330,7 +330,7 @@ def _mark_unbeaten(offers: Sequence[Offer]) -> Iterator[Offer]:
 
 
 def _find_step(start: Offer, offers: Sequence[Offer]) -> Offer | None:
-    """Return the nearest proposal with half the error or, failing that, the recommended proposal if it is better.
+    """Return the proposal closest to ``start`` with at most half its error, else the recommended one if it is better.
 
     Like ``suggest``, it tries the energy peaks first; if there is no energy peak, it takes a Pareto-optimal offer.
     """
