@@ -33,7 +33,7 @@ _MOST_STEPS: Final = 6
 _STEP_LENGTHS: Final = (1.0, 0.5, 0.25)
 # The refinement ends if a step raises twice the logarithm of the likelihood by less than this [-].
 _CONVERGED: Final = 0.1
-# Largest growth factor of the sum of heights in a step [-]; large lines that cancel each other would be fitted to noise.
+# Largest growth factor of the sum of heights in a step [-]; large lines that cancel out would be fitted to noise.
 _MOST_INFLATED: Final = 1.1
 # Relative damping of the normal equations, which would be singular if two lines are almost equal [-].
 _DAMPING: Final = 1e-9

@@ -62,7 +62,8 @@ class Swings(SignedAmplitudes):
     envelope : Envelope
         Estimate of the vibration energy.
     bottoms, floor : array of shape (k,)
-        Times of the minima [time], and the energy at them [energy]. """
+        Times of the minima [time], and the energy at them [energy].
+    """
 
     time: Samples
     deformation: Samples
