@@ -244,8 +244,9 @@ class Inventory:
     history_groups : frozenset of int
         Ids of /THPART: element groups that a time history lists among its parts.
     kept_off : tuple of int
-        Main nodes of rigid bodies that a Radioss run keeps inactive. flaws : tuple of Flaw Faults that ruin a run with
-        rigid bodies.
+        Main nodes of rigid bodies that a Radioss run keeps inactive.
+    flaws : tuple of Flaw
+        Faults that ruin a run with rigid bodies.
     boundary : Boundary
         Supports, prescribed motions and gravity.
     left_rigid : LeftRigid, optional

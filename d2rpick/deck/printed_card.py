@@ -60,8 +60,9 @@ class Printing(NamedTuple):
     name : str
         Name of the run.
     starter : str
-        Cards to be added to the starter deck of the run. sensor : int Id of the first sensor, if sensors switch the
-        bodies.
+        Cards to be added to the starter deck of the run.
+    sensor : int
+        Id of the first sensor, if sensors switch the bodies.
     contact, wall : int, optional
         Id of the contact, or of the rigid wall, whose force switches.
     pushed : tuple of (float, float)

@@ -172,8 +172,9 @@ def find_drift(
     ----------
     seen : Flying
     placement : Placement, optional
-        Positions of the parts according to the deck, which show how the body rotates. displacements : function,
-        optional Reads the displacements of nodes, which show the rotation if the parts do not.
+        Positions of the parts according to the deck, which show how the body rotates.
+    displacements : function, optional
+        Reads the displacements of nodes, which show the rotation if the parts do not.
 
     Returns
     -------
@@ -467,9 +468,11 @@ def find_bodies_in_flight(
     ----------
     history : History
     flight : Flight
-        Flight with the parts that fly in it. told : sequence of RigidBody or None Bodies that the deck defines; if
-        there is no deck, the parts are assumed to become one body. placement : Placement, optional Positions of the
-        parts according to the deck.
+        Flight with the parts that fly in it.
+    told : sequence of RigidBody or None
+        Bodies that the deck defines; if there is no deck, the parts are assumed to become one body.
+    placement : Placement, optional
+        Positions of the parts according to the deck.
     """
     if not told:
         away = find_parts_apart(history, flight)

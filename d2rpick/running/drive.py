@@ -63,8 +63,10 @@ class Driven:
     legs : tuple of Leg
         All computed engine runs.
     why : str
-        Reason for the length of the waiting time. saved : (float or None, float or None) Saved fraction of the cost of
-        a deformable run according to the cost model, and to the CPU times [-]; None if unknown.
+        Reason for the length of the waiting time.
+    saved : (float or None, float or None)
+        Saved fraction of the cost of a deformable run according to the cost model, and to the CPU times [-]; None if
+        unknown.
     """
 
     run: OpenedRun

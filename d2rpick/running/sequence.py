@@ -116,17 +116,25 @@ class LegFindings(NamedTuple):
     free : float
         Start of the current force-free time [time].
     wait : float or None
-        Force-free time after which a flight is detected [time]; None as long as it is unknown. why : str Reason for the
-        length of the waiting time. flies : bool True if no force has acted for as long as the waiting time. tr : float
-        Start or end of the engine run, whichever has the higher internal energy [time]. idle : bool True if the parts
-        have never stored internal energy. short : tuple of (float, float) Start and end of each force-free time in the
-        engine run that was shorter than the waiting time [time].
+        Force-free time after which a flight is detected [time]; None as long as it is unknown.
+    why : str
+        Reason for the length of the waiting time.
+    flies : bool
+        True if no force has acted for as long as the waiting time.
+    tr : float
+        Start or end of the engine run, whichever has the higher internal energy [time].
+    idle : bool
+        True if the parts have never stored internal energy.
+    short : tuple of (float, float)
+        Start and end of each force-free time in the engine run that was shorter than the waiting time [time].
     contact : float or None
         First contact of the rigid body [time].
     swing : float
-        Half of the longest oscillation period so far, even if a force lengthened it [time]. steady_from : float In a
-        flight shorter than this, an oscillating part displaces the body by more than 1 % of its path [time].
-        swing_warning : str Warning about this part for a shorter flight, or "".
+        Half of the longest oscillation period so far, even if a force lengthened it [time].
+    steady_from : float
+        In a flight shorter than this, an oscillating part displaces the body by more than 1 % of its path [time].
+    swing_warning : str
+        Warning about this part for a shorter flight, or "".
     """
 
     free: float = 0.0

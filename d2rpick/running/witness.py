@@ -52,8 +52,9 @@ class SeenFlight(NamedTuple):
     seen : float
         Time of the state at which the waiting time was over [time].
     end : float or None
-        Time of the first state at which a force acts [time]; None if the record ends before. wait : Wait Waiting time,
-        i.e. the force-free time after which the flight was detected.
+        Time of the first state at which a force acts [time]; None if the record ends before.
+    wait : Wait
+        Waiting time, i.e. the force-free time after which the flight was detected.
     quantity : str
         The quantity that shows the flight: "momentum less gravity" or "contact energy".
     left : float
@@ -61,8 +62,9 @@ class SeenFlight(NamedTuple):
     gravity : float
         Acceleration, as in `FreeFlight`.
     parts : tuple of Part or None
-        Parts that fly together; None stands for the whole model. level : float or None Time at which the centre of mass
-        is again as high as at ``start`` [time]; None if this time is before ``seen``.
+        Parts that fly together; None stands for the whole model.
+    level : float or None
+        Time at which the centre of mass is again as high as at ``start`` [time]; None if this time is before ``seen``.
     """
 
     start: float
@@ -96,8 +98,9 @@ class GrowingWitness:
     time : array of float
         Times of the states, shape (n,) [time].
     members : tuple of int
-        Indices in the momenta of the parts that fly together; empty if only the contact energy is written. free : list
-        of int For each state, the index of the first state of the force-free time that lasts up to this state.
+        Indices in the momenta of the parts that fly together; empty if only the contact energy is written.
+    free : list of int
+        For each state, the index of the first state of the force-free time that lasts up to this state.
     flights : list of SeenFlight
         Flights so far.
     pauses : list of (float, float)

@@ -132,8 +132,9 @@ def find_oscillator(
     Returns
     -------
     span : Span or None
-        None if no oscillator describes the record around td or before. fit : Identification The accepted fit with its
-        hidden fraction of the vibration energy, or the reason why none is accepted.
+        None if no oscillator describes the record around td or before.
+    fit : Identification
+        The accepted fit with its hidden fraction of the vibration energy, or the reason why none is accepted.
     """
     history, bounds = search.history, search.bounds
     if window:
@@ -189,8 +190,9 @@ def find_described_span(
     Returns
     -------
     span : Span or None
-        None if no oscillator describes the record around td or before. fit : Identification Fit to that window; if
-        there is none, the refused fit to the bounds up to td, with the reason.
+        None if no oscillator describes the record around td or before.
+    fit : Identification
+        Fit to that window; if there is none, the refused fit to the bounds up to td, with the reason.
     """
     up_to_td = Span(search.bounds.start, _mark(search.bounds, td))
     refused = {}
@@ -469,7 +471,9 @@ def estimate_hidden_share(time: Samples, energy: Samples, mode: Mode) -> float:
     Parameters
     ----------
     time, energy : array of shape (n,)
-        The states in the fitted window [time], [energy]. mode : Mode The fitted mode.
+        The states in the fitted window [time], [energy].
+    mode : Mode
+        The fitted mode.
     """
     span = float(time[-1] - time[0])
     count = min(time.size - 1, _MOST_LINES)
@@ -497,11 +501,14 @@ def measure_deviations(
     Parameters
     ----------
     time, energy : array of shape (n,)
-        The states in the fitted window [time], [energy]. fit : Identification An accepted fit.
+        The states in the fitted window [time], [energy].
+    fit : Identification
+        An accepted fit.
 
     Returns
     -------
-    times, deviations : array of shape (d,) Times [time], and the deviations near them [energy], which are not negative.
+    times, deviations : array of shape (d,)
+        Times [time], and the deviations near them [energy], which are not negative.
     """
     assert fit.mode is not None
     period = np.pi / fit.mode.omega

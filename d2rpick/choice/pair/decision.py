@@ -77,8 +77,9 @@ class Decision(NamedTuple):
     better_level : float or None
         Energy level at td of the better pair, relative to that of this pair [-]; None if it was not compared.
     cure_of_objections : str
-        Advice on how to remove the objections if there is no better pair. best_of : (float, float) or None Range of td
-        in which this pair is the best [time]; None if not all td of the range were compared.
+        Advice on how to remove the objections if there is no better pair.
+    best_of : (float, float) or None
+        Range of td in which this pair is the best [time]; None if not all td of the range were compared.
     is_compared : bool
         True if a finished switched run was compared with the reference run.
     """

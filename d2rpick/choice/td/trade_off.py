@@ -232,8 +232,9 @@ def explore_run(
     reference : Reference
     settings : Settings
     td_window : (float, float), optional
-        Window for td [time]. The default is the longest flight or, if there is none and td is given, the whole record.
-        td : float, optional Requested td, with which others are compared [time].
+        Window for td [time].  The default is the longest flight or, if there is none and td is given, the whole record.
+    td : float, optional
+        Requested td, with which others are compared [time].
     steps : int
         Number of td on an even grid, to which every energy peak is added. If there are more peaks than grid points, the
         highest peak in each interval of the grid replaces the grid point.
@@ -432,8 +433,9 @@ def explore_around(
     situation : Situation
         Describes the requested or chosen td.
     window : (float, float), optional
-        Window in which td was chosen [time]. The default is the flight that contains td. steps : int, optional Number
-        of td on an even grid. The default is the number that a page needs.
+        Window in which td was chosen [time].  The default is the flight that contains td.
+    steps : int, optional
+        Number of td on an even grid.  The default is the number that a page needs.
     since : float, optional
         No flight is assumed to begin before this time [time].
 
