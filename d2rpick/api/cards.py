@@ -391,7 +391,7 @@ def _add_bodies(printing: Printing, question: RunQuestion) -> Printing:
 
 
 def collect_cautions(card: JudgedCard) -> tuple[Caution, ...]:
-    """Return the cautions of a card and of its verdicts, each only once, with one for each verdict that fails."""
+    """Return the cautions about a card and its verdicts without duplicates, one of them for each negative verdict."""
     of_verdicts = (
         caution
         for verdict in card.verdicts

@@ -326,7 +326,7 @@ def judge_pair(
     switched: Run | None = None,
     min_mean_energy: float = MIN_MEAN_ENERGY,
 ) -> Verdict:
-    """Judge a pair. A finished switched run, if given, is compared as well, and defines times that are not given."""
+    """Judge a pair. A finished switched run is compared with the reference run, and supplies omitted times."""
     check_pair(tr, td, switched)
     switched_reference = switched and question.reference.like(
         switched.files, question.selection

@@ -269,7 +269,7 @@ def _is_part_line(row: Row) -> bool:
 
 
 def _count_lines(count: int) -> str:
-    """Describe the number of part lines after the header lines."""
+    """Return a phrase that states how many part lines follow the header lines."""
     return "1 part line follows" if count == 1 else f"{count or 'no'} part lines follow"
 
 

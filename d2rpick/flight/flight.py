@@ -292,7 +292,7 @@ def list_witnesses(history: History) -> tuple[Witness, ...]:
 
 
 def _make_witnesses(history: History) -> Iterator[Witness]:
-    """Compute the sources of evidence for the flights in a history, from most to least reliable."""
+    """Compute the evidence for the flights in a history, from the most to the least reliable source."""
     if history.momenta:
         from d2rpick.flight import momentum
 

@@ -431,7 +431,7 @@ def find_parts_flying_together(run: OpenedRun) -> tuple[Part, ...]:
 
 
 def _list_cores(momenta: Momenta) -> Iterator[tuple[int, ...]]:
-    """Yield the sets of parts attached to the heaviest part at various times, without parts that slide at that time.
+    """For each of several times, yield the parts attached to the heaviest part, except those that slide at this time.
 
     A part that moves at constant velocity, such as a loose sliding wheel, does not disturb any sum, so it would
     otherwise be treated as a part of the body.

@@ -369,7 +369,7 @@ class Off(NamedTuple):
 
 
 class Bodies:
-    """Rigid bodies in a flight with their displacements; a single body is assumed if the deck defines none (``told``).
+    """Rigid bodies in a flight with their displacements; a single body is assumed unless a deck defines them.
 
     If one displacement is unknown, the error is unknown too, because this displacement may be the largest. ``apart``
     contains the parts that are to become one body with others but separate from them. If there are any, ``staying``

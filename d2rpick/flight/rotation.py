@@ -203,7 +203,7 @@ def _sum_without_each(terms: Samples, masses: Samples) -> Samples:
 def _list_linear_terms(
     time: Samples, ways: Samples, masses: Samples
 ) -> tuple[Samples, Samples, Samples]:
-    """Return each part's least-squares system: squares (parts,), right-hand side (parts, 3), matrix (parts, 3, 3)."""
+    """Return the normal equations of each part: squares (parts,), right side (parts, 3), matrix (parts, 3, 3)."""
     flat = ways.reshape(time.size, -1)
     bent_places, arm = (
         remove_line(time, values).reshape(ways.shape)

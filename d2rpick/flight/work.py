@@ -49,7 +49,7 @@ _OF_DIGITS: Final = 4
 # _MUCH: a relative loss of kinetic energy of at least this is attributed to friction instead of damping [-].
 _LITTLE, _MUCH = 5e-3, 0.5
 
-# Relative error of the damped energy if it is computed from the damping rate of the vibration [-].
+# Relative error of the energy that damping dissipates if it is computed from the damping rate [-].
 _RATE_ERROR: Final = 0.02
 
 

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     Addresses = NDArray[np.int64]
 
 _HELD: Final = 1 << 24  # Largest size of a file that is read into memory [bytes].
-_LINES: Final = 1 << 16  # Number of bytes in which line endings are counted at a time.
+_LINES: Final = 1 << 16  # Line endings are counted in blocks of this size [bytes].
 # Number of bytes at each end of a file that are compared to check that a file has only grown.
 _END: Final = 1 << 12
 
@@ -296,7 +296,7 @@ class Scattered(OnDisk):
 
     @cached_property
     def _own(self) -> local:  # type: ignore[override]  # a property overrides an attribute
-        """The window of the current thread, which is created on first use because most files need no window."""
+        """The view of the file that this thread uses, which is created on first use because most files need none."""
         from threading import local
 
         return local()

@@ -33,10 +33,10 @@ _TYPED_TIME: Final = (
 
 # A time converted to ms or us is plausible if it is at least this fraction of the record after its start [-].
 _NEVER_MEANT: Final = 0.01
-# A converted time is suggested only if it is at least this fraction of the record after its start [-].
+# A converted time is suggested only if it lies at least this fraction of the record after the start [-].
 _HARDLY_MEANT: Final = 0.05
 # A td within this number of first states is assumed to be in another unit, because it would hardly save time.
-# Only a record of 1000 or more states can contain both a td and 1000 times this td.
+# In a record of fewer than 1000 states, a td and 1000 times this td cannot both be valid.
 _FIRST_STATES: Final = 10
 
 

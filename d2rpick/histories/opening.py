@@ -78,7 +78,7 @@ def load_reader(kind: str) -> Reader:
 def open_run(
     names: Sequence[str], selection: Selection = _DEFAULT, input_format: str = "auto"
 ) -> OpenedRun:
-    """Open the files of one run. Files of one format are its restart segments, other files are companion files.
+    """Open the files of one run: files of the same format are its restart segments, and all others are companion files.
 
     Parameters
     ----------

@@ -26,9 +26,9 @@ _ALIKE = 2.0
 _TOGETHER: Final = 8
 # A root has converged if its time changes by at most this fraction [-], which is about the rounding error.
 _STILL: Final = 8 * float(np.finfo(np.float64).eps)
-# Number of halvings of a bracket that are tested together if there are few brackets.
+# Number of halvings of a root bracket that are evaluated in one call if there are at most _FEW brackets.
 _HALVED_TOGETHER: Final = 5
-_FEW: Final = 100  # Largest number of brackets that are treated as few.
+_FEW: Final = 100  # Above this number of brackets, evaluating several halvings at once costs more than it saves.
 # Number of bisections that narrow a bracket to the rounding error.
 HALVINGS: Final = 50
 

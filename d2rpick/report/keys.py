@@ -347,7 +347,7 @@ def _get_modes(situation: Situation) -> list[dict[str, float]] | None:
     return [mode._asdict() for mode in modal.modes_at(situation.td)] if modal else None
 
 
-# JSON fields of a situation at td.
+# JSON fields that describe the vibration and the flight at td.
 MECHANICS: Final = row(
     Field("energy_td", "number"),
     Field("kinetic_share", maybe(SHARE)),

@@ -353,7 +353,7 @@ def _describe_cost_change(start: Offer, step: Offer) -> str:
 
 
 def _format_offer_error(offer: Offer) -> str:
-    """Return the error of a proposed pair with its name."""
+    """Return the name and the value of the error of a proposed pair, such as "residual 0.02"."""
     if offer.error is None:
         return "an energy above twice its mean"
     if offer.basis == "energy":

@@ -135,7 +135,7 @@ def list_next_step(
 
 
 def list_comparison_verdict(switched: Comparison) -> tuple[str, str]:
-    """Return a name, and a text that states whether the switched run agrees with the reference run within limits."""
+    """Return a row: its name, and whether the switched run agrees with the reference run within the limits."""
     compared = []
     if switched.mean_after_reference > 0:
         ratio = switched.mean_after / switched.mean_after_reference

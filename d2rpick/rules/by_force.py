@@ -1,4 +1,4 @@
-"""Evaluate switches by a contact or rigid-wall force with a history that shows when this force acts.
+"""Evaluate switches triggered by a contact or rigid-wall force, with a history that shows when this force acts.
 
 Forces that the solver wrote show when each contact and wall acts. Momenta show that a force acts on a part, but not
 which contact exerts it, so decks with several contacts or walls are not judged by momenta.

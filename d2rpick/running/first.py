@@ -24,7 +24,7 @@ def first_card(
     wait: float | None = None,
     after: float | None = None,
 ) -> tuple[PrintedCard, Wait]:
-    """Print the cards with which the first run of a deck switches its parts by contact forces.
+    """Print the cards that switch the parts in the first run of a deck, triggered by contact forces.
 
     Parameters
     ----------

@@ -100,7 +100,7 @@ class Order(NamedTuple):
         return self.kind != LOAD
 
     def undone(self) -> Order:
-        """Return the order at the end of the previous engine run, as if this engine run had not been computed."""
+        """Return the order to repeat this engine run, from the end of the previous one."""
         return self._replace(number=self.number - 1, until=self.start)
 
     def following(self, kind: str, until: float) -> Order:

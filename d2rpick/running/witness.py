@@ -1,4 +1,4 @@
-"""Find, at each state of a record, the force-free time of the given parts or the model from the states so far.
+"""At each state of a record, find how long the parts or the model have been free of forces, from the states so far.
 
 In the force-free time, the momentum without the effects of gravity and damping is constant within 1e-4 of its largest
 value so far. If no momentum is written, the contact energy must be constant instead. A flight is detected once this has
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.names import Part
     from d2rpick.running.inner_motion import Wait
 
-    # Returns the gravity between two states, None if another force acts or a support holds parts.
+    # Returns the acceleration due to gravity between two states, or None if another force acts or parts are supported.
     FindGravity = Callable[["GrowingWitness", int, int], float | None]
 
 # Changes of a momentum or contact energy up to this fraction of its largest value so far are treated as zero [-].

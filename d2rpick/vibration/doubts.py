@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from d2rpick.vibration.locked_lines import StretchLine
     from d2rpick.vibration.midpoint import Reading
 
-# Number of values of tr and of td at which the overlap of the deformations is compared with its bounds.
+# Number of values of tr and of td at which the correlation of the deformations is checked against its bounds.
 _CHECKED: Final = 90
 
 # Largest prediction error of an accepted record, relative to the range of the energy [-].

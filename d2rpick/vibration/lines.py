@@ -47,7 +47,7 @@ _ABOVE_NOISE: Final = 20.0
 # _ALL_POWER: the lowest-frequency lines that together have this fraction of the power are treated as relevant [-].
 # _STRONG_POWER: the lowest-frequency lines that together have this fraction of the power are treated as strong [-].
 _ALL_POWER, _STRONG_POWER = 1 - 2e-5, 0.95
-# Length of the first part of the record that is searched for early decaying lines, as a fraction of the record [-].
+# Fraction of the record, from its start, that is searched for spectral lines that decay early [-].
 _EARLY: Final = 0.25
 # _LEAST_TURNS: smallest number of cycles of a line in the record.
 # _SURE_TURNS: a line with more than this number of cycles cannot be confused with slow changes of the mean.

@@ -280,7 +280,7 @@ def _leaving(mode: Mode, edges: Samples, wanted: Samples, room: Samples) -> Samp
     column = np.flatnonzero(first > 0)
     inner = edges[first[column] - 1, column]
     outer = edges[first[column], column]
-    # The deformation q leaves the band above ``wanted`` if ``side`` is 1, and below ``wanted`` if ``side`` is -1.
+    # The deformation q leaves the band through its upper limit if ``side`` is 1, through its lower limit if it is -1.
     middle = wanted[column]
     tolerated = room[column]
     side = np.sign(mode.deformation(outer) - middle)

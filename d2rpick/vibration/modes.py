@@ -196,7 +196,7 @@ class Mode(SignedAmplitudes):
     ) -> tuple[NDArray[np.intp], Samples]:
         """Find the level crossings for every ``td`` (n,) at once; return the td index and the time of each crossing."""
         level = self.deformation(td)
-        # Each zero of q is a single crossing of the level zero, whatever the sign of the rounding error.
+        # Each zero of q is counted as one zero crossing, whatever the sign of the rounding error.
         zero = np.abs(level) <= _ZERO * np.sqrt(self.vibration_energy(td))
         level = np.where(zero, 0.0, level)
         ends = np.append(td, np.where(zero, start, td))

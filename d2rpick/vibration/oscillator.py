@@ -74,7 +74,7 @@ class Oscillator:
 
     @property
     def reduced_mass(self) -> float:
-        """Return mu = m M/(m + M), the mass that vibrates against the spring."""
+        """Return the reduced mass mu = m M/(m + M) of the two masses that the spring connects."""
         return self.frame_mass * self.mass / (self.frame_mass + self.mass)
 
     @property

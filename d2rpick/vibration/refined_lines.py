@@ -136,7 +136,7 @@ def _try_steps(grid: Grid, spectrum: Spectrum, step: Complex) -> Iterator[Spectr
 
 
 def _sum_sizes(spectrum: Spectrum) -> float:
-    """Return the sum of the heights of all lines at the first time [energy]."""
+    """Return the sum of the heights of all spectral lines at the first sample [energy]."""
     return float(np.abs(spectrum.lines.weights).sum())
 
 

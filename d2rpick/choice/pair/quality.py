@@ -61,7 +61,7 @@ MOST_WORTH_OF_GOOD: Final = 0.01
 MOST_WORTH_OF_FAIR: Final = 0.05
 # Smallest number of states that resolve a flight; if there are fewer, a shorter output interval is proposed.
 _ENOUGH_STATES: Final = 200
-# If at least this many states lie before td, more states are not proposed as the cure.
+# More frequent output is proposed as a cure only if fewer than this number of states lie before td.
 _FEW_STATES: Final = 20
 # Largest number of parts that are named in a sentence.
 _NAMED: Final = 5

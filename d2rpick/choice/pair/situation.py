@@ -70,7 +70,7 @@ def is_at_rest(
     start, end = flight
     last = td if end is None else max(td, end - LEAST_MARGIN * (end - start))
     _, inside = history.between(start, last)
-    # This number of samples is too small to show a vibration.
+    # Fewer samples than this cannot show a vibration.
     if inside.size < MIN_SAMPLES_PER_PERIOD:
         return False
     # The rounding error is 0 if no energy is written at all.

@@ -190,7 +190,7 @@ def make_monotone_grid(situation: Situation, candidates: Candidates) -> Samples:
 
 
 def _make_limit_on_error(situation: Situation, level: float) -> Keeps:
-    """Return a test of times for tr: the error must not exceed ``level``, nor the energy its limit."""
+    """Return a predicate that accepts a tr if its error is at most ``level`` and its energy at most a given limit."""
     highest = find_largest_energy(situation)
 
     def has_small_error(times: Samples) -> NDArray[np.bool_]:

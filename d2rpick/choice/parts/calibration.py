@@ -367,7 +367,7 @@ def _make_observation(
 def _make_zone_observations(
     zones: ZoneTimes, inventory: Inventory, rigid: Sequence[_RigidPart]
 ) -> Iterator[Observation]:
-    """Yield an observation for each set of rigid parts: the median over the states in which these parts are rigid."""
+    """Yield one observation for each set of rigid parts: the median CPU time of a cycle while they are rigid."""
     number = sum(counts.total() for counts in inventory.counts.values())
     states: dict[frozenset[int], list[float]] = {}
     for time, per_zone in zip(

@@ -227,7 +227,7 @@ def find_done_windows(
     windows: Sequence[Times],
     planned: Sequence[Flight] | None,
 ) -> tuple[DoneWindow, ...]:
-    """Find when the flights with completed windows landed, and when these landings were planned."""
+    """Find the actual and the planned landing times of the flights whose windows are complete."""
     done = []
     for tr, td in windows:
         flight = _find_flight_around(history, flights, tr, td)

@@ -558,7 +558,7 @@ def _choose_by_level(
 def _list_by_rigid_time(
     situation: Situation, times: Iterable[float]
 ) -> Iterator[Choice]:
-    """Yield acceptable choices in descending order of the bound on their rigid time, until none can be longer."""
+    """Yield acceptable choices, largest upper bound on the rigid time first, until no other can be rigid for longer."""
     tds = np.fromiter(times, np.float64)
     longest = 0.0
     bounds = bound_rigid_times(situation, tds)

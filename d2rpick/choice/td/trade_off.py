@@ -331,7 +331,7 @@ def _mark_unbeaten(offers: Sequence[Offer]) -> Iterator[Offer]:
 
 
 def _find_step(start: Offer, offers: Sequence[Offer]) -> Offer | None:
-    """Return the nearest proposal with half the error or, failing that, the recommended proposal if it is better.
+    """Return the proposal closest to ``start`` with at most half its error, else the recommended one if it is better.
 
     Like ``suggest``, this function tries the energy peaks first. If no peak is suitable, it returns a Pareto-optimal
     offer.

@@ -213,7 +213,7 @@ class Blocks(Database):
     def _read(
         self, values: Samples, run: Stretch, offsets: Addresses, taken: Fields | None
     ) -> None:
-        """Read the numbers of many equal blocks. Copied numbers are reused, and constant numbers are read only once."""
+        """Read the numbers of many blocks of the same layout. A field that never changes is read only once."""
         varied_before = np.append(0, np.cumsum(self._varied[run.start] != 0))
         moves = varied_before[offsets + self._grammar.width] > varied_before[offsets]
         still = self._decoded(run.start + offsets[~moves])
@@ -240,7 +240,7 @@ class Blocks(Database):
         )
 
     def _refuse_odd(self, values: Samples, names: Sequence[Hashable]) -> None:
-        """Raise FormatError, with the line number, for the first value (states, len(names)) that is not a number."""
+        """Raise FormatError with the line of the first value of ``values`` (states, len(names)) that is no number."""
         odd = np.isnan(values)
         if not odd.any():
             return
@@ -326,7 +326,7 @@ class Blocks(Database):
     def _known(
         self, position: int, recent: list[tuple[int, int]]
     ) -> tuple[int, int, int] | None:
-        """Return example, stride and count of the blocks at ``position`` if their layout is recent, otherwise None."""
+        """Return the example, stride and number of blocks at ``position`` if ``recent`` has their layout, else None."""
         start = self._grammar.start
         for example, stride in recent:
             if self.text(position + stride, len(start)) == start:

@@ -156,7 +156,7 @@ def _describe_glstat_block(
         literal[line.start(2) : line.start(2) + _WIDTH] = 0
         is_mixed |= name in fields
         fields[name] = line.start(2)
-    if is_mixed:  # Any line of the block may belong to another state.
+    if is_mixed:  # The block may mix lines of two states.
         fields = {
             name: offset if name == _TIME else UNSURE for name, offset in fields.items()
         }
