@@ -289,7 +289,7 @@ def _describe_step(trade_off: TradeOff, requested: Offer) -> str:
     return f"{distance} {error_change} and {cost_change}"
 
 
-DOCUMENT: Final = Document("d2rpick/explore/1", "Answer of d2rpick explore; times in the unit of the history.", row(
+DOCUMENT: Final = Document("d2rpick/explore/2", "Answer of d2rpick explore; times in the unit of the history.", row(
     *keys.FRAME,
     Field("td", "number?", "given td", lambda trade_off: trade_off.requested and trade_off.requested.td),
     Field("td_window", "span",

@@ -58,18 +58,15 @@ SWITCHED: Final = row(
     Field("notes", "texts"),
     name="switched", later=("rigid_from", "rigid_to", "objections"),
 )  # fmt: skip
-DOCUMENT: Final = Document("d2rpick/verify/1", "Answer of d2rpick verify; times in the unit of the history.", row(
+DOCUMENT: Final = Document("d2rpick/verify/2", "Answer of d2rpick verify; times in the unit of the history.", row(
     *keys.FRAME,
     *keys.MECHANICS.of_part(lambda answer: answer.situation),
     *MEASURES.fields,
     *keys.QUALITY,
-    keys.NO_PARTS,
     keys.HEALTH,
     Field("reasons", "texts"),
     Field("switched", maybe(SWITCHED), "comparison of a finished switched run with the reference run; null without "
                                        "--switched"),
-    later=("kinetic_share_estimated", "modes", "unsigned_parts", "health", "quality", "quality_reasons", "parts",
-           *keys.LATER),
 ))  # fmt: skip
 COMPARED = ("", "switched", "reference")
 
