@@ -102,9 +102,10 @@ class StudyRow:
     ``status`` is "ok"; "none": nothing can be recommended; "unreadable"; "out-of-range": the record does not reach td
     or is too short; "failed": its process died; "internal-error": the program failed.  ``message`` gives the reason for
     a status other than "ok"; ``warnings`` are codes.  ``quality`` to ``cure`` are those of the suggestion for its pair.
-    ``td`` is that of the run.  ``acceptable`` are the windows of acceptable tr, shape (n, 2), ``alike`` those in which
-    the error is at most 0.05 above that of its tr, ``profile`` the errors, shape (2, m).  ``files`` were read, up to
-    ``record_end``; ``curve`` is an outline of the energy, shape (2, k), if it was requested.
+    ``td`` is that of the run, ``better_td`` that of a better pair.  ``acceptable`` are the windows of acceptable tr,
+    shape (n, 2), ``alike`` those in which the error is at most 0.05 above that of its tr, ``profile`` the errors, shape
+    (2, m).  ``files`` were read, up to ``record_end``; ``curve`` is an outline of the energy, shape (2, k), if it was
+    requested.
     """
 
     source: str
@@ -125,6 +126,7 @@ class StudyRow:
     verdict: str | None = None
     verdict_reason: str | None = None
     cure: str | None = None
+    better_td: float | None = None
     acceptable: Samples = field(default_factory=lambda: np.zeros((0, 2)))
     alike: Samples = field(default_factory=lambda: np.zeros((0, 2)))
     profile: Samples | None = None
@@ -298,6 +300,7 @@ def _list_decision_fields(decision: Decision | None) -> dict[str, Any]:
         return {}
     return {
         "quality": decision.grade,
+        "better_td": decision.better.td if decision.better else None,
         "verdict": decision.verdict,
         "verdict_reason": decision.reason,
         "cure": decision.cure,
