@@ -185,6 +185,7 @@ class RunAnswer(Paged):
             command,
             judging,
             explorer=self._explorer([explored]),
+            question=self.question.repeated,
         )
         if chosen is None:
             return context

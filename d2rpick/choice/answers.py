@@ -399,7 +399,7 @@ class PairSuggestion(AnswerAtTd):
         )
 
     def _find_better_than(self, candidate: Candidate) -> Pair | None:
-        """Return a pair that is clearly better than a candidate: at another td or, failing that, the recommended one."""
+        """Return a pair that is clearly better than a candidate: at another td, or else the recommended one."""
         recommended = self.recommended
         is_usable = self.decision is not None and self.decision.grade != POOR
         if self._good_pair or recommended is None or not is_usable:

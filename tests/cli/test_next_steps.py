@@ -1,5 +1,6 @@
 """The next step named in an answer works, and messages name only what the user gave."""
 
+import html
 import re
 import shlex
 from pathlib import Path
@@ -593,3 +594,44 @@ def test_a_flight_that_is_too_short_has_no_other_verdict() -> None:
     assert "with --min-rigid 0.3 (another value may allow one)" in find_line(
         "next", *question
     )
+
+
+# The page of an answer gives its next step.
+
+
+@pytest.mark.parametrize(
+    "question",
+    [
+        ("suggest", "--td", "0.064", ENERGY),
+        ("suggest", "--td", "0.0687534", ENERGY),
+        ("verify", "--tr", "0.0128853", "--td", "0.064", ENERGY),
+        ("verify", "--tr", "0.0135867", "--td", "0.0687534", ENERGY),
+        ("explore", "--td", "0.064", "--steps", "3", ENERGY),
+        ("plan", ENERGY),
+    ],
+    ids=" ".join,
+)
+def test_a_page_gives_the_next_step_of_its_answer(
+    question: tuple[str, ...], tmp_path: Path
+) -> None:
+    page = tmp_path / "page.html"
+    run(*question, "--report", str(page))
+    (step,) = re.findall(
+        r"<dt>next</dt><dd>(.*?)</dd>", page.read_text(encoding="utf-8")
+    )
+    assert html.unescape(step) == find_line("next", *question)
+
+
+# The better pair that verify names has no better pair itself.
+
+
+@pytest.mark.parametrize(("tr", "td"), [("0.006", "0.08"), ("0.02", "0.064")])
+def test_the_better_pair_of_verify_is_good_at_once(tr: str, td: str) -> None:
+    verdict = run_json("verify", "--tr", tr, "--td", td, ENERGY)
+    named = re.search(r"td = ([0-9.]+)", verdict["cure"])
+    assert named
+    followed = run_json("suggest", "--td", named[1], ENERGY)
+    assert (followed["verdict"], followed["cure"]) == ("use", "")
+    # A row of the candidates at this td names the same pair.
+    candidates = run_json("suggest", "--td", td, ENERGY)["candidates"]
+    assert verdict["cure"] in {row["cure"] for row in candidates}
