@@ -1,7 +1,7 @@
 """Flights found by all evidence in the files of computed runs, compared with the known flights of these runs."""
 
-import re
 import json
+import re
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple
