@@ -87,12 +87,12 @@ SCHEMAS = [
     f"schemas/{name}.json"
     for name in (
         *(
-            "suggest-1",
-            "explore-1",
+            "suggest-2",
+            "explore-2",
             "plan-1",
             "parts-1",
             "calibrate-1",
-            "verify-1",
+            "verify-2",
             "info-1",
             "check-1",
             "study-1",

@@ -1,12 +1,12 @@
 """Find the parts that must not be switched whatever their energy, and the reasons.
 
 Material that flows through its mesh is not a body. A law that computes the stress from the deformation since the start
-has that start as its stress-free reference. What the part underwent as a rigid body (a stress that was set to zero, or
-a motion that is not its own) becomes a deformation when it is switched back.
+has the start as its stress-free reference. The changes of the part while it is rigid (stresses that were set to zero,
+or a motion that differs from its own) become a deformation when it is switched back.
 
 Source: the vendor's keyword data for ELFORM, the theory of the laws, Altair's public help for /ALE/MAT, /EULER/MAT,
-/PROP/SOLID and the laws, and a report of 2026 on LS-DYNA R14 (a hyperelastic solid that had stress after the switch
-back). Not tried with LS-DYNA.
+/PROP/SOLID and the laws, and a report of 2026 on LS-DYNA R14 (a hyperelastic solid that had stress after it was
+switched back). This was not tested with LS-DYNA.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ _GAINS: Final = "so it may gain stress when it is switched back"
 class Unswitchable(NamedTuple):
     """The reason why a part must not be switched.
 
-    ``flows``: its material flows through the mesh, else its law keeps a reference.
+    ``flows`` is True if its material flows through the mesh, and False if its material law has a reference state.
     """
 
     flows: bool

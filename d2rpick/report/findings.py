@@ -58,27 +58,36 @@ _SARIF: Final = {
 _NOT_XML: Final = "[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]"
 
 _LINE: Final = get_kind("integer", minimum=1)
-_COUNTS: Final = ("errors", "warnings", "infos", "decks")
+# Keys of the summary, with what each of them counts.
+_COUNTS: Final = {
+    "errors": "errors",
+    "warnings": "warnings",
+    "infos": "info messages",
+    "decks": "decks",
+}
 FINDING: Final = row(
-    Field("rule", get_kind("text", pattern="^D2R[0-9]{3}$")),
+    Field("rule", get_kind("text", pattern="^D2R[0-9]{3}$"), "id of the rule"),
     Field(
         "severity",
         one_of(*map(str, Severity)),
-        get=lambda finding: str(finding.severity),
+        "severity of the finding",
+        lambda finding: str(finding.severity),
     ),
-    Field("message", "text"),
-    Field("file", "text"),
-    Field("line", _LINE),
-    Field("column", _LINE),
-    Field("deck", "text"),
+    Field("message", "text", "what is wrong, and how to correct it"),
+    Field("file", "text", "file that contains the problem"),
+    Field("line", _LINE, "line of the problem"),
+    Field("column", _LINE, "column of the problem"),
+    Field("deck", "text", "main file of the deck"),
 )
 _WINDOW: Final = row(
-    *(Field(key, "integer?") for key in ("part", "part_set", "node")),
-    Field("tr", "number"),
-    Field("td", "number?"),
-    Field("file", "text"),
-    Field("line", _LINE),
-    Field("deck", "text"),
+    Field("part", "integer?", "switched part; null if the card names a part set or a main node"),
+    Field("part_set", "integer?", "switched part set of LS-DYNA, otherwise null"),
+    Field("node", "integer?", "main node of the switched /RBODY of Radioss, otherwise null"),
+    keys.TR,
+    keys.TD._replace(kind="number?", meaning="time at which the parts become deformable again; null if never"),
+    Field("file", "text", "file that contains the card"),
+    Field("line", _LINE, "line of the card"),
+    Field("deck", "text", "main file of the deck"),
     Field("verdict", maybe(keys.VERDICT), "what to do with the pair; null if no history is given to judge it",
           later=True),
     Field("verdict_reason", "text?", "reason for the verdict, as text", later=True),
@@ -354,24 +363,37 @@ DOCUMENT: Final = Document(
         Field(
             "decks",
             "texts",
-            get=lambda checks: [
+            "main files of the decks that were checked",
+            lambda checks: [
                 format_path(result.deck, checks.root) for result in checks.results
             ],
         ),
         Field(
             "history",
             "texts?",
-            get=lambda checks: (
+            "files of the reference run; null without --history",
+            lambda checks: (
                 checks.history
                 and [format_path(name, checks.root) for name in checks.history]
             ),
         ),
-        Field("windows", many(_WINDOW), get=_list_window_objects),
-        Field("findings", many(FINDING), get=list_findings),
+        Field(
+            "windows",
+            many(_WINDOW),
+            "rigid windows that the decks define, with their verdicts",
+            _list_window_objects,
+        ),
+        Field("findings", many(FINDING), "problems found", list_findings),
         Field(
             "summary",
-            row(*(Field(key, get_kind("integer", minimum=0)) for key in _COUNTS)),
-            get=lambda checks: {
+            row(
+                *(
+                    Field(key, get_kind("integer", minimum=0), f"number of {counted}")
+                    for key, counted in _COUNTS.items()
+                )
+            ),
+            "numbers of findings and decks",
+            lambda checks: {
                 **count_severities(checks.results),
                 "decks": len(checks.results),
             },

@@ -5,7 +5,7 @@ part is rigid. Two flags of the cards do this, for all constraints of a kind.  P
 connects separate unless they are one rigid body.
 
 Source: vendor keyword data for NRBF (nodal rigid bodies, generalized welds), NCSF (nodal constraints, spotwelds) and
-LRB; the vendor's public modelling rules for rigid bodies, which except joints between rigid bodies.
+LRB; the vendor's public modelling rules for rigid bodies, which permit joints between rigid bodies.
 """
 
 from __future__ import annotations
@@ -125,8 +125,9 @@ def _find_flags(case: Case, card: SwitchSet) -> _Flags | None:
 class _Joining(NamedTuple):
     """A constraint and the parts that it joins.
 
-    ``deformable`` are those of the ``parts`` that no card makes rigid. ``body_count`` is the number of rigid bodies to
-    which the other parts belong. ``flags`` are those of the cards that make parts rigid, keyed by part id.
+    ``deformable`` contains those of the ``parts`` that no card makes rigid. ``body_count`` is the number of rigid
+    bodies to which the other parts belong. ``flags`` contains NRBF and NCSF of the cards that make parts rigid, keyed
+    by part id.
     """
 
     constraint: Constraint

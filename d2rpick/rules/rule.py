@@ -49,9 +49,9 @@ WINDOW: Final = (("0.02", "OFF"), ("0.09", "ON"), ("0.2", "OFF"))
 class Example(NamedTuple):
     """An example deck called ``name``, with the files that it includes or that belong to the same run.
 
-    ``history`` holds the arguments of ``d2rpick replay``, or of the command ``computed_by``, that write the energy
-    history for the check. ``options`` holds further arguments of ``d2rpick check``. If ``stdin`` is true, the deck is
-    read from standard input.
+    ``history`` contains the arguments with which ``d2rpick replay``, or the command ``computed_by``, writes the energy
+    history for the check. ``options`` contains further arguments of ``d2rpick check``. If ``stdin`` is True, the deck
+    is read from standard input.
     """
 
     deck: str
@@ -124,8 +124,8 @@ def write_automatic_card(
 ) -> str:
     """Return a *DEFORMABLE_TO_RIGID_AUTOMATIC card.
 
-    ``pair`` holds RELSW and PAIRED. ``counts`` holds D2R and R2D, for an example with wrong counts. ``delay`` is TIME3
-    and ``contact`` is ENTNO.
+    ``pair`` contains RELSW and PAIRED. ``counts`` contains D2R and R2D for an example with wrong counts. ``delay`` is
+    TIME3, and ``contact`` is ENTNO.
     """
     d2r, r2d = counts or (len(rigid), len(deformable))
     relsw, paired = pair
