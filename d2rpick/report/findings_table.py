@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import os
 from collections import Counter
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import make_printable, name_units
@@ -18,11 +17,42 @@ from d2rpick.rules.base import Severity, group_values
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
+    from typing import Any, ClassVar, Protocol
 
     from d2rpick.base.errors import Caution
     from d2rpick.report.formats import DisplayOptions
     from d2rpick.rules import Checked, CheckedWindow
     from d2rpick.rules.base import Finding, Unreadable
+
+    class Checks(Protocol):
+        """What the output formats show of the findings in several decks."""
+
+        # Mark of a dataclass, of which `dataclasses.replace` makes changed copies.
+        __dataclass_fields__: ClassVar[dict[str, Any]]
+
+        @property
+        def results(self) -> Sequence[Checked]:
+            """Results of the decks that could be read."""
+
+        @property
+        def root(self) -> str:
+            """Folder below which paths are shown relative to it."""
+
+        @property
+        def failed(self) -> Sequence[Unreadable]:
+            """Decks that could not be read."""
+
+        @property
+        def cautions(self) -> Sequence[Caution]:
+            """Warnings about the input."""
+
+        @property
+        def history(self) -> Sequence[str] | None:
+            """Files from which the windows were judged; None if there are none."""
+
+        @property
+        def fail_on(self) -> Severity:
+            """Least severe finding that counts as a failure."""
 
 
 # Nouns for the severities error, warning and info.
@@ -32,22 +62,6 @@ _SOME_RUN: Final = "SWITCHED_RUN"
 # Rule that reports switches without a time, and the end of its message if nothing else gives their time.
 _UNTIMED_RULE: Final = "D2R302"
 _NOT_JUDGED: Final = "not judged by time"
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Checks:
-    """The findings in several decks; paths below ``root`` are shown relative to it.
-
-    ``failed`` lists the decks that could not be read.  ``history`` lists the files from which the windows were judged;
-    None if there is none.  Findings less severe than ``fail_on`` are not failures.
-    """
-
-    results: Sequence[Checked]
-    root: str = field(default_factory=os.getcwd)
-    failed: Sequence[Unreadable] = ()
-    cautions: Sequence[Caution] = ()
-    history: Sequence[str] | None = None
-    fail_on: Severity = Severity.ERROR
 
 
 def as_table(checks: Checks, display: DisplayOptions) -> str:
