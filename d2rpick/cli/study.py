@@ -31,8 +31,9 @@ from d2rpick.report.formats import FORMATS, RepeatedQuestion
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
-    from d2rpick.api.studies import Ledger
+    from d2rpick.api.studies import Ledger, Study
     from d2rpick.base.workers import Farm
+    from d2rpick.choice.runs.study import StudyRow
 
 
 @options.make_command
@@ -142,6 +143,11 @@ def study(
             times=options.write_times(td=td, td_window=td_window), files=sources
         ),
     )
+    _finish_study(answer, rows, output)
+
+
+def _finish_study(answer: Study, rows: Sequence[StudyRow], output: Output) -> None:
+    """Exit with the code that the answer and the rows require, after a message that explains the code."""
     if not answer.judged:
         tell(f"d2rpick: no run could be judged; the first: {rows[0].message or ''}")
     if not answer.judged or any(row.status == INTERNAL_ERROR for row in rows):
