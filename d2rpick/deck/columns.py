@@ -90,7 +90,9 @@ class DataLine:
         start = 0
         for column in (column for group in groups for column in group):
             name = column.name or f" {start}"
-            self._columns[name] = column._replace(start=start)
+            self._columns[name] = CardColumn(
+                column.name, column.kind, column.width, start
+            )
             start += column.width
 
     def __getitem__(self, name: str) -> CardColumn:

@@ -27,13 +27,12 @@ if TYPE_CHECKING:
 # Formulations of *SECTION_SOLID (ELFORM) in which material flows through the mesh.
 _FLOWING: Final = {5: "ALE", 6: "Eulerian", 7: "Eulerian", 11: "ALE", 12: "ALE"}
 # Patterns of the *MAT keywords, by name and number, of material laws with a stress-free reference state.
-_REFERENCE_BY_NAME: Final = re.compile(
+# They are compiled at their first use, to keep start-up fast.
+_REFERENCE_BY_NAME: Final = (
     r"MAT_(BLATZ-KO|MOONEY-RIVLIN|FRAZER_NASH|FRAZER-NASH|HYPERELASTIC|OGDEN|ARRUDA_BOYCE|SIMPLIFIED_RUBBER"
     r"|SOFT_TISSUE|LOW_DENSITY_FOAM|FU_CHANG_FOAM|ORTHOTROPIC_ELASTIC|ANISOTROPIC_ELASTIC)"
 )
-_REFERENCE_BY_NUMBER: Final = re.compile(
-    r"MAT_0*(2|7|27|31|57|77|77_[HO]|83|91|92|127|181)(_|\Z)"
-)
+_REFERENCE_BY_NUMBER: Final = r"MAT_0*(2|7|27|31|57|77|77_[HO]|83|91|92|127|181)(_|\Z)"
 _LAWS_WITH_REFERENCE: Final = {
     *(
         "LAW42",
@@ -82,7 +81,9 @@ def find_unswitchable_in_ls_dyna(
             reasons[part] = _make_flowing(
                 f"{_FLOWING[section.elform]}, ELFORM {section.elform}"
             )
-        elif _REFERENCE_BY_NAME.match(law) or _REFERENCE_BY_NUMBER.match(law):
+        elif law and (
+            re.match(_REFERENCE_BY_NAME, law) or re.match(_REFERENCE_BY_NUMBER, law)
+        ):
             reasons[part] = _make_with_reference(f"*{law}")
     return reasons
 

@@ -246,13 +246,17 @@ def _find_separating(case: Case, kinds: Sequence[Kind]) -> Iterator[Objection]:
 
 
 @set_passing(
-    PASS,
-    _make_constrained_deck(_BODY, "         1         0"),
-    _make_constrained_deck(_BODY.replace("   5\n", "   6\n")),
+    lambda: [
+        PASS,
+        _make_constrained_deck(_BODY, "         1         0"),
+        _make_constrained_deck(_BODY.replace("   5\n", "   6\n")),
+    ]
 )
 @set_failing(
-    _make_constrained_deck(_BODY),
-    _make_constrained_deck(_BODY, "         2         1"),
+    lambda: [
+        _make_constrained_deck(_BODY),
+        _make_constrained_deck(_BODY, "         2         1"),
+    ]
 )
 @make_rule_decorator(
     "D2R112", ERROR, "a nodal rigid body on a switched part stays active (NRBF)"
@@ -269,14 +273,18 @@ def _check_nodal_bodies(case: Case) -> Iterator[Objection]:
 
 
 @set_passing(
-    PASS,
-    _make_joined_deck(
-        _JOINING_BODY, "         1         0", "1", "         2         1      PART"
-    ),
+    lambda: [
+        PASS,
+        _make_joined_deck(
+            _JOINING_BODY, "         1         0", "1", "         2         1      PART"
+        ),
+    ]
 )
 @set_failing(
-    _make_joined_deck(_JOINING_BODY, "         1         0", "1", "2"),
-    _make_joined_deck(_JOINING_BODY, "         1         0", "1"),
+    lambda: [
+        _make_joined_deck(_JOINING_BODY, "         1         0", "1", "2"),
+        _make_joined_deck(_JOINING_BODY, "         1         0", "1"),
+    ]
 )
 @make_rule_decorator(
     "D2R120", ERROR, "a deleted nodal rigid body (NRBF 1) that joins separate bodies"
@@ -292,16 +300,20 @@ def _check_separated_parts(case: Case) -> Iterator[Objection]:
 
 
 @set_passing(
-    PASS,
-    _make_constrained_deck(_EXTRA, "         0         1"),
-    _make_constrained_deck(_JOINT, "         1         0"),
-    _make_constrained_deck(_SPOTWELD, "         0         1"),
+    lambda: [
+        PASS,
+        _make_constrained_deck(_EXTRA, "         0         1"),
+        _make_constrained_deck(_JOINT, "         1         0"),
+        _make_constrained_deck(_SPOTWELD, "         0         1"),
+    ]
 )
 @set_failing(
-    _make_constrained_deck(_EXTRA),
-    _make_constrained_deck(_JOINT),
-    _make_constrained_deck(_EXTRA.replace("  8  ", "  1  ")),
-    _make_constrained_deck(_SPOTWELD, "         1         0"),
+    lambda: [
+        _make_constrained_deck(_EXTRA),
+        _make_constrained_deck(_JOINT),
+        _make_constrained_deck(_EXTRA.replace("  8  ", "  1  ")),
+        _make_constrained_deck(_SPOTWELD, "         1         0"),
+    ]
 )
 @make_rule_decorator(
     "D2R113",
@@ -324,16 +336,23 @@ def _check_other_constraints(case: Case) -> Iterator[Objection]:
 
 
 @set_passing(
-    PASS,
-    _make_joined_deck(
-        _JOINING_JOINT, "         0         1", "1", "         2         1      PART"
-    ),
-    _make_joined_deck(_JOINING_WELD, "         1         0", "1", "2"),
+    lambda: [
+        PASS,
+        _make_joined_deck(
+            _JOINING_JOINT,
+            "         0         1",
+            "1",
+            "         2         1      PART",
+        ),
+        _make_joined_deck(_JOINING_WELD, "         1         0", "1", "2"),
+    ]
 )
 @set_failing(
-    _make_joined_deck(_JOINING_JOINT, "         0         1", "1", "2"),
-    _make_joined_deck(_SET + _BODY + _HELD_JOINT, "         1         0", "1", "2"),
-    _make_joined_deck(_JOINING_WELD, "         0         1", "1"),
+    lambda: [
+        _make_joined_deck(_JOINING_JOINT, "         0         1", "1", "2"),
+        _make_joined_deck(_SET + _BODY + _HELD_JOINT, "         1         0", "1", "2"),
+        _make_joined_deck(_JOINING_WELD, "         0         1", "1"),
+    ]
 )
 @make_rule_decorator(
     "D2R121",
@@ -353,12 +372,16 @@ def _check_separated_joints(case: Case) -> Iterator[Objection]:
 
 
 @set_passing(
-    PASS,
-    make_deck(_MERGED.replace("1         2", "7         8") + THERE + BACK),
+    lambda: [
+        PASS,
+        make_deck(_MERGED.replace("1         2", "7         8") + THERE + BACK),
+    ]
 )
 @set_failing(
-    make_deck(_MERGED + THERE + BACK),
-    make_deck(_MERGED.replace("1         2", "2         1") + THERE + BACK),
+    lambda: [
+        make_deck(_MERGED + THERE + BACK),
+        make_deck(_MERGED.replace("1         2", "2         1") + THERE + BACK),
+    ]
 )
 @make_rule_decorator("D2R122", WARNING, "a switched part on *CONSTRAINED_RIGID_BODIES")
 def _check_merged_bodies(case: Case) -> Iterator[Objection]:
