@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from d2rpick.api.choosing import Choosing
     from d2rpick.api.request import Request
     from d2rpick.api.runs import Run
-    from d2rpick.choice.switched.switched_run import Times
+    from d2rpick.base.spans import Times
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)

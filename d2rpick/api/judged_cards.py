@@ -20,9 +20,9 @@ if TYPE_CHECKING:
     from d2rpick.api.asked import RunQuestion
     from d2rpick.api.cards import Judging
     from d2rpick.api.runs import Run
+    from d2rpick.base.spans import Times
     from d2rpick.choice.answers import PairVerdict
     from d2rpick.choice.pair.decision import Decision
-    from d2rpick.choice.switched.switched_run import Times
     from d2rpick.deck.printed_card import PrintedCard, Printing
 
 _ONLY_JUDGED: Final = "`parts` selects the parts whose energy judges a card for {}; give a `run` with parts"

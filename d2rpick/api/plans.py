@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     from d2rpick.api.checking import Findings
     from d2rpick.api.choosing import Choosing
     from d2rpick.api.runs import Run
+    from d2rpick.base.spans import Times
     from d2rpick.choice.parts.cost import Weights
-    from d2rpick.choice.switched.switched_run import Times
 
 _STEPS: Final = 200  # Default number of td values that are explored.
 
