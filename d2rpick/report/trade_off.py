@@ -68,9 +68,9 @@ _SPARE: Final = (
     "kinetic fraction",
 )
 
-_NONE_ADMISSIBLE: Final = "No td in the range has an admissible tr."
-_NONE_BETTER: Final = "No other td in the range is better."
-_NOT_HALVED: Final = "No other td in the range halves this error without giving up more than half of the rigid time."
+_NONE_ADMISSIBLE: Final = "no td in the range has an admissible tr"
+_NONE_BETTER: Final = "no other td in the range is better"
+_NOT_HALVED: Final = "no other td in the range halves this error without giving up more than half of the rigid time"
 
 
 def as_table(trade_off: TradeOff, display: DisplayOptions) -> str:
@@ -265,8 +265,7 @@ def give_answer(trade_off: TradeOff) -> str:
         quality_text = f"td = {requested.td:.6g} has no admissible tr"
     else:
         quality_text = f"td = {requested.td:.6g}: {_format_offer_error(requested)}"
-    separator = ". " if trade_off.step is None else "; "
-    return f"{quality_text}{separator}{_describe_step(trade_off, requested)}"
+    return f"{quality_text}; {_describe_step(trade_off, requested)}"
 
 
 def _describe_step(trade_off: TradeOff, requested: Offer) -> str:
