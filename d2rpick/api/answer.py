@@ -24,10 +24,10 @@ if TYPE_CHECKING:
 class Answer:
     """Base class of all answers; an answer is an immutable dataclass.
 
-    Two answers are equal if their content is equal, such as an answer and its copy from another process.
+    Two answers are equal if their contents are equal, for example an answer and its copy from another process.
 
-    ``warnings`` are (``code``, ``message``).  ``command`` is the command line that gives the same answer; weights that
-    come from no file are written as ``<weights in memory>``.
+    ``warnings`` contains (``code``, ``message``) of each warning. ``command`` is the command line that gives the same
+    answer; weights that were not read from a file are written as ``<weights in memory>``.
     """
 
     # Some answers store the command as a field; others compute it as a property. The cautions are a field of all.
@@ -120,7 +120,7 @@ class Paged(Answer):
     ) -> str:
         """Return the page; ``command`` is the command line that repeats it.
 
-        With the options ``judging``, the command ``card`` gives the same verdicts.
+        ``judging`` contains the options with which the command ``card`` gives the same verdicts.
         """
         from d2rpick.report import pages
 

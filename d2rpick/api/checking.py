@@ -37,13 +37,13 @@ if TYPE_CHECKING:
 class Findings(Answer):
     """Answer from `check`; it is immutable.
 
-    ``results`` has the result of each deck, ``failed`` lists the decks that could not be read.  Paths below ``root``
-    are shown relative to it.  ``history`` lists the files from which the windows were judged; None if there is none.
-    Findings less severe than ``fail_on`` are not failures.
+    ``results`` contains the result of each deck, and ``failed`` the decks that could not be read. Paths below ``root``
+    are shown relative to it. ``history`` contains the files from which the windows were judged; it is None if there are
+    none. Findings less severe than ``fail_on`` are not failures.
 
-    ``findings`` have ``rule``, ``severity``, ``message``, ``file``, ``line`` and ``column``.  ``windows`` are the
-    windows in which parts are rigid.  ``notes`` report what the readers of the history left out or assumed, and unused
-    settings.
+    Each of the ``findings`` has ``rule``, ``severity``, ``message``, ``file``, ``line`` and ``column``. ``windows``
+    contains the windows in which parts are rigid. ``notes`` reports unused settings, and what was omitted or assumed
+    when the history was read.
     """
 
     results: Sequence[Checked]
@@ -118,11 +118,12 @@ def check(
     decks : path or several
         Main decks, read with their includes; a folder stands for its main decks, ``-`` for standard input.
     history : Run, optional
-        The run by whose history the windows are judged; it must not be switched.
+        Run whose history is used to judge the windows; it must not be switched.
     select, ignore : string or several
-        Rules by id or by the beginning of the id; default: the rules selected in the configuration nearest to the deck.
+        Rules, given by their ids or beginnings of ids; the default is the selection in the configuration nearest to the
+        deck.
     **choosing
-        How to judge, as for `suggest`.
+        Options that determine how the windows are judged, as for `suggest`.
 
     Returns
     -------
@@ -135,7 +136,7 @@ def check(
     ConfigurationError
         If a rule does not exist.
     TypeError, ValueError
-        If an argument is not of its kind, or says how to judge where there is no history.
+        If an argument has a wrong type or value, or if options for judging are given without a history.
 
     Examples
     --------

@@ -26,7 +26,7 @@ from d2rpick.choice.health import (
 )
 from d2rpick.choice.pair.grades import DO_NOT_USE, USE, USE_WITH_CARE
 from d2rpick.choice.question import Reference, Settings
-from d2rpick.choice.switched.frozen import Times, find_frozen_times
+from d2rpick.choice.switched.frozen import find_frozen_times
 from d2rpick.choice.switched.switched_run import (
     find_rigid_times,
     select_model_momenta,
@@ -44,6 +44,7 @@ from d2rpick.histories.samples import compute_median
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
+    from d2rpick.base.spans import Times
     from d2rpick.histories.database import Legs
     from d2rpick.histories.history import Samples
     from d2rpick.histories.run import OpenedRun

@@ -45,8 +45,9 @@ from d2rpick.deck.switch_sets import (
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
+    from d2rpick.base.spans import Times
     from d2rpick.deck.contact_timing import Pushes
-    from d2rpick.deck.printed_card import Printing, Times
+    from d2rpick.deck.printed_card import Printing
 
 _FILE: Final = "switches.k"
 

@@ -25,9 +25,9 @@ from d2rpick.deck.radioss_deck import (
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
+    from d2rpick.base.spans import Spans
     from d2rpick.deck.card import Row
 
-    Spans = tuple[tuple[float, float], ...]  # Start and end of each time span [time].
     # A function that returns the time spans in which the force of an interface or rigid wall acts; None if unknown.
     Forces = Callable[[str, int], Spans | None]
 

@@ -38,10 +38,10 @@ from d2rpick.histories.surroundings import UNKNOWN
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator
 
+    from d2rpick.base.spans import Times
     from d2rpick.choice.pair.candidates import Pair
     from d2rpick.choice.pair.decision import Decision
     from d2rpick.choice.pair.situation import Situation
-    from d2rpick.choice.switched.switched_run import Times
     from d2rpick.deck.switching import SwitchWindow
     from d2rpick.histories.history import History
     from d2rpick.histories.opening import OpenedRun, Selection

@@ -287,8 +287,9 @@ def _leaving(mode: Mode, edges: Samples, wanted: Samples, room: Samples) -> Samp
     outside[0] = False
     first = np.argmax(outside, axis=0)
     column = np.flatnonzero(first > 0)
-    inner = edges[first[column] - 1, column]
-    outer = edges[first[column], column]
+    first_outside = first[column]
+    inner = edges[first_outside - 1, column]
+    outer = edges[first_outside, column]
     # The deformation q leaves the band through its upper limit if ``side`` is 1, through its lower limit if it is -1.
     middle = wanted[column]
     tolerated = room[column]
@@ -308,12 +309,14 @@ def vertices(
     time: Samples, values: Samples, at: NDArray[np.intp]
 ) -> tuple[Samples, Samples]:
     """Return times and values of the vertices of parabolas through the samples ``at`` and their neighbours."""
-    step_before = time[at] - time[at - 1]
-    step_after = time[at + 1] - time[at]
-    fall = (values[at] - values[at - 1]) / step_before
-    rise = (values[at + 1] - values[at]) / step_after
-    bend = (rise - fall) / (step_before + step_after)
-    slope = (fall * step_after + rise * step_before) / (step_before + step_after)
+    before, after = at - 1, at + 1
+    step_before = time[at] - time[before]
+    step_after = time[after] - time[at]
+    both_steps = step_before + step_after
+    slope_before = (values[at] - values[before]) / step_before
+    slope_after = (values[after] - values[at]) / step_after
+    bend = (slope_after - slope_before) / both_steps
+    slope = (slope_before * step_after + slope_after * step_before) / both_steps
     # A sample next to an infinite value, or on a straight line, is its own vertex.
     bent = np.isfinite(bend) & (bend != 0)
     step = np.divide(-slope, 2 * bend, out=np.zeros(at.shape), where=bent)
