@@ -409,8 +409,8 @@ def parts(tr: float | None, td: float | None, request: Request, output: Output) 
 )  # fmt: skip
 @options.make_file_option(
     "--done",
-    "File with the windows in which HISTORY was switched, a line 'tr td' for each, or the journal of d2rpick drive.  d2rpick "
-    "plans the later windows; -f value, -f card and --write-deck contain both.",
+    "File with the windows in which HISTORY was switched, a line 'tr td' for each, or the journal of d2rpick drive.  "
+    "d2rpick plans the later windows; -f value, -f card and --write-deck contain both.",
 )
 @options.make_file_option(
     "--before",
