@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final, Protocol
 
 from d2rpick.choice.pair.grades import DO_NOT_USE, USE, USE_WITH_CARE
 from d2rpick.flight import SOURCES
-from d2rpick.report.fields import Field, Kind, get_kind, many, maybe, one_of, row
+from d2rpick.report.fields import Field, get_kind, many, maybe, one_of, row
 from d2rpick.vibration import MODELS
 
 if TYPE_CHECKING:
@@ -123,10 +123,6 @@ _POSITION: Final = (
           "true if the position error may be larger: an internal motion that is slower than the flight, or that bends "
           "the body, looks like a rotation; null if unknown", later=True),
 )  # fmt: skip
-# Type of deprecated keys of single parts. They are null for one version before they are removed.
-_NO_VALUE: Final = Kind({"type": "null"})
-NO_PARTS: Final = Field("parts", get_kind("texts", maxItems=0),
-                        "deprecated: always empty, since parts are not compared one by one", lambda _: ())  # fmt: skip
 # All values of a candidate. New values are added at the end, so that the CSV columns keep their order.
 CANDIDATE: Final = row(
     Field(
@@ -164,12 +160,6 @@ CANDIDATE: Final = row(
         "residual",
         "size?",
         "residual R: relative error of the vibration after td; null if unknown",
-    ),
-    Field(
-        "part_mismatch",
-        _NO_VALUE,
-        "deprecated: always null, since parts are not compared one by one",
-        lambda _: None,
     ),
     Field("rigid_time", get_kind("number", exclusiveMinimum=0), "td minus tr"),
     Field(
@@ -235,7 +225,6 @@ _FIRST: Final = (
         "residual_low",
     ),
     *(
-        "part_mismatch",
         "timing_tolerance",
         "rigid_time",
         "rigid_fraction",
@@ -245,13 +234,6 @@ _FIRST: Final = (
 MEASURES: Final = (
     *_FIRST,
     *(key for key in CANDIDATE.keys if key not in (*_OF_TR, *_FIRST)),
-)
-# Keys that older results of ``suggest`` and ``verify`` lack.
-LATER: Final = (
-    "run_time_share",
-    "same_swing",
-    "residual_high",
-    *(field.key for field in _POSITION),
 )
 GRADE: Final = maybe(one_of("good", "fair", "poor"))
 VERDICT: Final = one_of(USE, USE_WITH_CARE, DO_NOT_USE)
@@ -423,7 +405,7 @@ _MODE: Final = row(
     Field("alpha", "number", "rate at which the energy of the mode decays [1/time]"),
     Field("vibration_energy_td", "number", "vibration energy of the mode at td"),
 )
-# JSON fields of a situation at td.
+# JSON fields that describe the vibration and the flight at td.
 MECHANICS: Final = row(
     Field("energy_td", "number", "internal energy at td"),
     Field("kinetic_share", maybe(SHARE), "kinetic fraction K: fraction of the vibration energy that is kinetic at td"),
@@ -436,6 +418,4 @@ MECHANICS: Final = row(
           _get_oscillator),
     Field("modes", maybe(many(_MODE)),
           "modes of basis modal, sorted by angular frequency; null for other bases", _get_modes),
-    Field("unsigned_parts", _NO_VALUE,
-          "deprecated: always null, since parts are not compared one by one", lambda _: None),
 )  # fmt: skip

@@ -358,7 +358,7 @@ def list_next_steps(
 def _list_step_without_window(
     plan: RunPlan, question: RepeatedQuestion
 ) -> list[tuple[str, str]]:
-    """Return the next command of a plan without a window that can be used now."""
+    """Return the command to type next if no window of a plan can be used now."""
     rows = [row for row in plan.flights if row.answer and not row.done]
     if not rows:
         if plan.done:

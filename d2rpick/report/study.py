@@ -248,7 +248,7 @@ def build_run_table(answer: StudyOfRuns) -> tuple[list[str], list[list[tables.Ce
 
 
 def _explain_status(row: StudyRow) -> str:
-    """Return the message of a run without the name of the run or, failing that, the codes of its warnings, if any."""
+    """Return the message of a run, without the name of the run. If it has none, return the codes of its warnings."""
     text = row.message or ", ".join(row.warnings)
     return text.removeprefix(f"{row.source.rstrip('/')}: ")
 

@@ -45,18 +45,15 @@ _JUDGED_PAIR: Final = row(
     *keys.PAIR.fields,
     Field("verdict", keys.VERDICT, "what to do with this pair"),
     Field("verdict_reason", "text", "reason for the verdict, as text"),
-    later=("verdict", "verdict_reason"),
 )
 # Fields of a candidate and of the decision on it.
 CANDIDATE: Final = row(
     *keys.CANDIDATE.of_part(lambda candidate_and_decision: candidate_and_decision[0]),
-    keys.NO_PARTS,
     *keys.DECIDED.of_part(
         lambda candidate_and_decision: candidate_and_decision[1],
         ("verdict", "verdict_reason", "cure"),
     ),
     name="candidate",
-    later=(*keys.LATER, "parts", "verdict", "verdict_reason", "cure"),
 )
 
 # _SPARE: columns that are omitted first if the table of candidates is too wide.
@@ -93,7 +90,7 @@ def _judge_pair_at_better_td(answer: PairSuggestion) -> dict[str, Any] | None:
     return {**pair, "verdict": decision.verdict, "verdict_reason": decision.reason}
 
 
-DOCUMENT: Final = Document("d2rpick/suggest/1", "Answer of d2rpick suggest; times in the unit of the history.", row(
+DOCUMENT: Final = Document("d2rpick/suggest/2", "Answer of d2rpick suggest; times in the unit of the history.", row(
     *keys.FRAME,
     keys.TD,
     Field("td_window", "span?",
@@ -112,8 +109,6 @@ DOCUMENT: Final = Document("d2rpick/suggest/1", "Answer of d2rpick suggest; time
     Field("better_td", maybe(_JUDGED_PAIR), "pair at a better td; null if there is none, or if it is the recommended "
                                             "pair",
           _judge_pair_at_better_td),
-    later=("health", "kinetic_share_estimated", "modes", "unsigned_parts", "td_window", "expected", "quality",
-           "quality_reasons"),
 ))  # fmt: skip
 
 

@@ -287,7 +287,7 @@ def _describe_step(trade_off: TradeOff, requested: Offer) -> str:
     return f"{distance} {error_change} and {cost_change}"
 
 
-DOCUMENT: Final = Document("d2rpick/explore/1", "Answer of d2rpick explore; times in the unit of the history.", row(
+DOCUMENT: Final = Document("d2rpick/explore/2", "Answer of d2rpick explore; times in the unit of the history.", row(
     *keys.FRAME,
     Field("td", "number?", "given td", lambda trade_off: trade_off.requested and trade_off.requested.td),
     Field("td_window", "span",
@@ -351,7 +351,7 @@ def _describe_cost_change(start: Offer, step: Offer) -> str:
 
 
 def _format_offer_error(offer: Offer) -> str:
-    """Return the error of a proposed pair with its name."""
+    """Return the name and the value of the error of a proposed pair, such as "residual 0.02"."""
     if offer.error is None:
         return "an energy above twice its mean"
     if offer.basis == "energy":

@@ -67,18 +67,15 @@ SWITCHED: Final = row(
     Field("notes", "texts", "what was left out or assumed when the switched run was read, and anomalies of this run"),
     name="switched", later=("rigid_from", "rigid_to", "objections"),
 )  # fmt: skip
-DOCUMENT: Final = Document("d2rpick/verify/1", "Answer of d2rpick verify; times in the unit of the history.", row(
+DOCUMENT: Final = Document("d2rpick/verify/2", "Answer of d2rpick verify; times in the unit of the history.", row(
     *keys.FRAME,
     *keys.MECHANICS.of_part(lambda answer: answer.situation),
     *MEASURES.fields,
     *keys.QUALITY,
-    keys.NO_PARTS,
     keys.HEALTH,
     Field("reasons", "texts", "reasons for the verdict, and remarks"),
     Field("switched", maybe(SWITCHED), "comparison of a finished switched run with the reference run; null without "
                                        "--switched"),
-    later=("kinetic_share_estimated", "modes", "unsigned_parts", "health", "quality", "quality_reasons", "parts",
-           *keys.LATER),
 ))  # fmt: skip
 COMPARED = ("", "switched", "reference")
 
@@ -144,7 +141,7 @@ def list_next_step(
 
 
 def list_comparison_verdict(switched: Comparison) -> tuple[str, str]:
-    """Return a name, and a text that states whether the switched run agrees with the reference run within limits."""
+    """Return a row: its name, and whether the switched run agrees with the reference run within the limits."""
     compared = []
     if switched.mean_after_reference > 0:
         ratio = switched.mean_after / switched.mean_after_reference
