@@ -69,6 +69,7 @@ class RunAnswer(Paged):
             command,
             judging,
             explorer=self._explorer([explored]),
+            question=self.question.repeated,
         )
         if chosen is None:
             return context

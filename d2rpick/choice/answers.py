@@ -135,13 +135,24 @@ class PairVerdict(AnswerAtTd):
 
     @cached_property
     def better(self) -> Pair | None:
-        """A better pair with a grade other than "poor", at this td or at the nearest suitable peak; otherwise None."""
-        return None if self._is_refuted else self._good_pair
+        """A better pair with a grade other than "poor": that of ``suggest`` for this td, or what it names as better."""
+        if self._is_refuted:
+            return None
+        good = self._good_pair
+        if good is None or good.td != self.situation.td:
+            return good
+        decision = decide_with_better_pair(self._suggestion)
+        return decision.better if decision and decision.better else good
+
+    @cached_property
+    def _suggestion(self) -> PairSuggestion:
+        """The answer of ``suggest`` for this td, from the reference run alone."""
+        return suggest_at(self.situation)
 
     @cached_property
     def _good_pair(self) -> Pair | None:
         """The pair recommended from the reference run alone, even if a finished switched run is known."""
-        return find_good_pair(self.situation)
+        return find_good_pair(self._suggestion)
 
     @property
     def _is_refuted(self) -> bool:
@@ -384,7 +395,18 @@ class PairSuggestion(AnswerAtTd):
             objections=(*objections, *messages),
             is_admissible=candidate.admissible,
             best_residual=self.recommended.residual if self.recommended else None,
+            better=self._find_better_than(candidate),
+            best_of=None if self.clearly_better else self.compared_td,
         )
+
+    def _find_better_than(self, candidate: Candidate) -> Pair | None:
+        """Return a pair that is clearly better than a candidate: at another td, or else the recommended one."""
+        recommended = self.recommended
+        is_usable = self.decision is not None and self.decision.grade != POOR
+        if self._good_pair or recommended is None or not is_usable:
+            return self._good_pair
+        is_better = _has_smaller_residual(recommended, candidate)
+        return recommended if is_better or not candidate.admissible else None
 
     @property
     def quality(self) -> Quality | None:
@@ -572,9 +594,8 @@ def find_better_pair(situation: Situation) -> Pair | None:
     return None
 
 
-def find_good_pair(situation: Situation) -> Pair | None:
+def find_good_pair(answer: PairSuggestion) -> Pair | None:
     """Return a pair whose grade is not "poor": the recommended pair at this td or else a better pair at another td."""
-    answer = suggest_at(situation)
     if answer.decision and answer.decision.grade != POOR:
         return answer.recommended
     return _drop_poor(answer.better_pair)

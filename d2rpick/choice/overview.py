@@ -153,6 +153,8 @@ class Overview(NamedTuple):
         """Reasons to use a run with flights only with care."""
         health = warn_about_health(self.health) if self.health else ()
         doubts = [caution.message for caution in health]
+        if doubts and not self.rigid:
+            doubts.append("d2rpick plan judges each flight only up to its td")
         if self.rigid:
             when = _list_times(self.rigid)
             doubts.insert(

@@ -171,10 +171,10 @@ class Output:
     def answer(self, answer: Answer, below: str = "", **display_options: Any) -> None:
         """Write an answer in the requested format."""
         now = self.shown(**display_options)
-        text = name_options_and_wrap(
-            answer.text(self.output_format, now), self.output_format, now.width
-        )
-        self.result(f"{text}\n\n{below}" if below else text)
+        text = answer.text(self.output_format, now)
+        if below:
+            text = f"{text}\n\n{below}"
+        self.result(name_options_and_wrap(text, self.output_format, now.width))
 
     def beside_answer(self, answer: Paged, page: Callable[[], str]) -> None:
         """Write the figure and the page if the user requests them."""

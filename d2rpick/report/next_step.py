@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
+from d2rpick.base.errors import list_names
 from d2rpick.choice.pair.grades import DO_NOT_USE
 from d2rpick.report.tables import make_positional, quote_shell_line
 
@@ -29,6 +30,17 @@ _FOLDER: Final = "switched"
 _FLYING: Final = "flying"
 # Statement of the last step, when the pairs of all flights have been compared.
 _NO_PAIR: Final = "no pair of this run can be used"
+# Options that can be the reason why no pair can be used.
+_LIMITS: Final = (
+    "--after",
+    "--landing",
+    "--margin",
+    "--max-kinetic-share",
+    "--max-residual",
+    "--min-quality",
+    "--min-rigid",
+    "--tolerance",
+)
 # Reason why the card of several parts needs the main deck.
 _NEEDS_DECK: Final = (
     f" (main deck of the run instead of {_SOME_DECK}; "
@@ -164,6 +176,18 @@ def _name_step_to_better_record(decision: Decision, question: RepeatedQuestion) 
     return f"improve the record: {decision.cure}; no pair of it can be used before"
 
 
+def name_lack_of_pairs(question: RepeatedQuestion) -> str:
+    """Return the statement that no pair of the run can be used, with the given options that may be the reason."""
+    words = (*question.times, *question.options)
+    limits = [
+        f"{name} {words[words.index(name) + 1]}" for name in _LIMITS if name in words
+    ]
+    if not limits:
+        return _NO_PAIR
+    values = "another value" if len(limits) == 1 else "other values"
+    return f"{_NO_PAIR} with {list_names(limits)} ({values} may allow one)"
+
+
 def name_way_out_of_run(answer: PairSuggestion, question: RepeatedQuestion) -> str:
     """Return the step after a comparison of all flights in which no pair can be used.
 
@@ -171,18 +195,19 @@ def name_way_out_of_run(answer: PairSuggestion, question: RepeatedQuestion) -> s
     """
     situation = answer.situation
     is_chosen = question.parts or "--energy" in question.options
+    no_pair = name_lack_of_pairs(question)
     if situation.flight.by_parts and not is_chosen:
         line = write_command(question, "plan", new_parts=[_FLYING])
         return (
-            f"{_NO_PAIR} with all parts; judge the parts that fly together with {line}"
+            f"{no_pair} with all parts; judge the parts that fly together with {line}"
         )
     cure = answer.decision.cure_without_other_times if answer.decision else ""
     if cure:
-        return f"{_NO_PAIR}: {cure}"
+        return f"{no_pair}: {cure}"
     if situation.history.parts:
         line = write_command(question._replace(parts=()), "parts")
-        return f"{_NO_PAIR} with these parts; find other parts with {line}"
-    return f"{_NO_PAIR}: run it without switching, or make other parts rigid"
+        return f"{no_pair} with these parts; find other parts with {line}"
+    return f"{no_pair}: run it without switching, or make other parts rigid"
 
 
 def name_step_after_refusal(

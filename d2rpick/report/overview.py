@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import list_names, make_printable
@@ -99,6 +100,10 @@ _RECORD: Final = {
     USE_WITH_CARE: "use it with care to choose times",
     DO_NOT_USE: "do not use it to choose times",
 }
+# Advice if momenta are written but show no flight.
+_GIVE_END_OF_LOAD: Final = "if you know that the parts fly after a load, give its end to d2rpick plan with --after"
+# Statement that no file names the unit of time.
+_UNNAMED: Final = "not named by the files: all values are in the units of the run"
 # Keys of the JSON output whose value is neither a list nor an object.
 _PLAIN = (
     "format",
@@ -140,8 +145,11 @@ def list_overview_lines(overview: Overview) -> list[tuple[str, str]]:
     lines += [("flight", _format_flight(*flight)) for flight in overview.flights]
     if overview.verdict == DO_NOT_USE:
         is_known = overview.unjudged or overview.rigid
-        cure = None if is_known else overview.should_write
-        return [*lines, ("to improve", f"write {cure}")] if cure else lines
+        if is_known:
+            return lines
+        missing = overview.should_write
+        cure = f"write {missing}" if missing else _GIVE_END_OF_LOAD
+        return [*lines, ("to improve", cure)]
     which = [*_list_selection_options(overview)]
     deck = ["--deck", overview.deck] if overview.deck else []
     command = ["d2rpick", "plan", *which, *deck]
@@ -235,12 +243,12 @@ def list_facts(overview: Overview) -> list[tuple[str, tables.Cell]]:
         ("states", overview.states),
         ("first time", overview.time_start),
         ("last time", overview.time_end),
-        ("time unit", overview.time_unit or None),
+        ("time unit", overview.time_unit or _UNNAMED),
         ("shortest interval", sampling.min if sampling else None),
         ("median interval", sampling.median if sampling else None),
         ("longest interval", sampling.max if sampling else None),
         ("complete", _describe_completeness(overview)),
-        ("channels", ", ".join(overview.channels) or None),
+        ("channels", ", ".join(_list_distinct_channels(overview)) or None),
     ]
     rows += [
         ("contact force", _format_force(force)) for force in overview.contact_forces
@@ -248,6 +256,15 @@ def list_facts(overview: Overview) -> list[tuple[str, tables.Cell]]:
     if overview.should_write:
         rows.append(("should write", overview.should_write))
     return rows
+
+
+def _list_distinct_channels(overview: Overview) -> list[str]:
+    """Return the channels; of those whose names differ only in case and separators, only the first."""
+    channels = {
+        re.sub("[^a-z0-9]+", "_", channel.lower()): channel
+        for channel in reversed(overview.channels)
+    }
+    return [channel for channel in overview.channels if channel in channels.values()]
 
 
 def _describe_completeness(overview: Overview) -> bool | None:

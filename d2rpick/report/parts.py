@@ -189,6 +189,11 @@ _FLIGHT: Final = row(
     Field("longest", "flag", "true for the longest flight"),
 )
 _MOST_SHOWN = 6
+# Explanation of the position errors, if some sets have none and those of others are unknown.
+_ZERO_BESIDE_UNKNOWN: Final = (
+    "the error is 0 if each rigid body is a single part; it is unknown if a body has several parts, and the files do "
+    "not show how they move relative to each other"
+)
 # Columns that are omitted, in this order, if a terminal is too narrow.
 _SPARE: Final = (
     "material",
@@ -549,6 +554,9 @@ def list_page_remarks(answer: Parts) -> list[tuple[str, str]]:
             "to include its gain in the saving, give --step-ratio"
         )
         lines.append(("time step", f"{grows}; {cures}"))
+    errors = [part_set.position_error for part_set in answer.sets]
+    if None in errors and 0.0 in errors:
+        lines.append(("position", _ZERO_BESIDE_UNKNOWN))
     lines += [
         (name_set(part_set), reason)
         for part_set in answer.sets

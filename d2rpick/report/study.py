@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, Final
@@ -72,6 +73,7 @@ PLAIN: Final = row(
     Field("verdict", maybe(keys.VERDICT), "what to do with the pair of this run", later=True),
     Field("verdict_reason", "text?", "reason for the verdict, as text", later=True),
     Field("cure", "text?", "how to improve the pair; empty for a good pair", later=True),
+    Field("better_td", "number?", "td of a better pair; null if none is known", later=True),
     Field("energy_unit", "text", "unit of the energies; empty if no file contains it", later=True),
 )  # fmt: skip
 _ERROR: Final = Field(
@@ -135,6 +137,10 @@ _LINE: Final = row(
     name="line", later=("common_error", "curve", "record_end"), **_JUDGED,
 )  # fmt: skip
 _MOST_REASONS: Final = 3
+# Numbers in a reason; reasons that differ only in them are shown once.
+_NUMBER: Final = r"\d+(?:\.\d+)?(?:e[+-]?\d+)?"
+# Runs share a better td if their better td differ by at most this fraction [-].
+_SAME_TD: Final = 1e-3
 # Columns that are omitted, in this order, if a terminal is too narrow; the energy at td is omitted before them.
 _SPARE: Final = (
     "+-",
@@ -345,18 +351,27 @@ def list_run_reasons(answer: StudyOfRuns) -> list[tuple[str, str]]:
 
     The reasons for "use" are among them if the vibration error is large, but small beside the next contact.
     """
-    causes = Counter(
-        (row.verdict, row.verdict_reason, row.cure)
-        for row in answer.runs
-        if row.verdict and (row.cure or _has_large_error(row))
-    )
-    return [
-        (
-            "why",
-            f"{verdict} in {format_number_of_runs(count)}: {reason}{f'. To improve: {cure}' if cure else ''}",
-        )
-        for (verdict, reason, cure), count in causes.most_common(_MOST_REASONS)
-    ]
+    rows_by_cause: dict[tuple[str | None, str], list[StudyRow]] = {}
+    for run in answer.runs:
+        if run.verdict and (run.cure or _has_large_error(run)):
+            without_numbers = re.sub(_NUMBER, "#", _describe_cause(run))
+            rows_by_cause.setdefault((run.verdict, without_numbers), []).append(run)
+    groups = sorted(rows_by_cause.values(), key=len, reverse=True)
+    return [("why", _describe_shared_cause(rows)) for rows in groups[:_MOST_REASONS]]
+
+
+def _describe_shared_cause(rows: Sequence[StudyRow]) -> str:
+    """Return the verdict, reason and cure that runs share; if their numbers differ, with those of the first run."""
+    causes = {_describe_cause(row) for row in rows}
+    example = f" (numbers of {rows[0].source})" if len(causes) > 1 else ""
+    runs = format_number_of_runs(len(rows))
+    return f"{rows[0].verdict} in {runs}: {_describe_cause(rows[0])}{example}"
+
+
+def _describe_cause(row: StudyRow) -> str:
+    """Return why the pair of a run is not better, and how to improve it."""
+    cure = f". To improve: {row.cure}" if row.cure else ""
+    return f"{row.verdict_reason}{cure}"
 
 
 def _has_large_error(row: StudyRow) -> bool:
@@ -377,7 +392,13 @@ def list_next_step(
         return [("next", f"look at the first run with {write_command(first, 'info')}")]
     worst = min(judged, key=lambda row: GRADES.index(row.quality or POOR))
     of_worst = question._replace(files=(worst.source,))
-    if worst.quality == POOR:
+    better_td = _find_shared_better_td(answer)
+    if worst.quality == POOR and better_td is not None:
+        readable = tuple(row.source for row in answer.runs if row.judged)
+        of_readable = question._replace(files=readable)
+        line = write_command(of_readable, "study", "--td", f"{better_td:.6g}")
+        step = f"judge all runs at the better td with {line}"
+    elif worst.quality == POOR:
         line = write_command(of_worst, "suggest", *question.times)
         step = f"look at the first of the worst runs with {line}"
     elif len(judged) == 1:
@@ -397,6 +418,17 @@ def list_next_step(
         line = write_command(of_worst, "verify", *times)
         step = f"judge the common pair in the worst run with {line}"
     return [("next", step)]
+
+
+def _find_shared_better_td(answer: StudyOfRuns) -> float | None:
+    """Return the better td that all runs with a given td share [time]; None if one has no other or a different td."""
+    poor = [row for row in answer.runs if row.quality == POOR]
+    found = [row.better_td for row in poor if row.better_td is not None]
+    if answer.td is None or len(poor) < 2 or len(found) < len(poor):
+        return None
+    is_shared = max(found) - min(found) <= _SAME_TD * max(found)
+    is_other = abs(found[0] - answer.td) > _SAME_TD * answer.td
+    return found[0] if is_shared and is_other else None
 
 
 def describe_td(answer: StudyOfRuns) -> str:

@@ -68,9 +68,9 @@ _SPARE: Final = (
     "kinetic fraction",
 )
 
-_NONE_ADMISSIBLE: Final = "No td in the range has an admissible tr."
-_NONE_BETTER: Final = "No other td in the range is better."
-_NOT_HALVED: Final = "No other td in the range halves this error without giving up more than half of the rigid time."
+_NONE_ADMISSIBLE: Final = "no td in the range has an admissible tr"
+_NONE_BETTER: Final = "no other td in the range is better"
+_NOT_HALVED: Final = "no other td in the range halves this error without giving up more than half of the rigid time"
 
 
 def as_table(trade_off: TradeOff, display: DisplayOptions) -> str:

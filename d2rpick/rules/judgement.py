@@ -56,7 +56,9 @@ _KEPT: Final = (
     "few-states",
     WRONG_ENERGY,
 )
-_UNKNOWN: Final = "the history does not show when the load ends; give that time with --after (in Python: after)"
+_UNKNOWN: Final = (
+    "the history does not show when the load ends; give that time with `after`"
+)
 
 
 class Fault(NamedTuple):
@@ -150,6 +152,9 @@ class HistoryJudge:
         ``together`` contains the parts that are switched at the same times. A window that a force switches
         (``by_force``) is judged between states of the history.
         """
+        if window.closed is None and window.opened.by.kind == "plain":
+            # A part that is rigid from the start to the end of the run has no time that a history could judge.
+            return Judgement()
         td = window.td if window.td is not None and window.td > window.tr else None
         history_parts = self._known
         if (

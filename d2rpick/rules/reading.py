@@ -374,8 +374,23 @@ def _report_untimed(case: Case) -> Iterator[Objection]:
                 card.card.here,
                 f"*{card.card.name} {reason}{_describe_course(sensed)}",
             )
+        elif reason and _has_judged_end(case, card):
+            judged = "its parts are judged by the time at which they deform again"
+            yield card.card.here, f"*{card.card.name} {reason}; {judged}"
         elif reason:
             yield card.card.here, f"*{card.card.name} {reason}; not judged by time"
+
+
+def _has_judged_end(case: Case, card: SwitchSet) -> bool:
+    """Return True if a history judges a window that a card opens at the start of the run, because the window ends."""
+    return (
+        case.judge is not None
+        and card.kind == "plain"
+        and any(
+            window.opened.by is card and window.closed is not None
+            for window in case.windows.windows
+        )
+    )
 
 
 @set_passing(

@@ -1,5 +1,6 @@
 """The next step named in an answer works, and messages name only what the user gave."""
 
+import html
 import re
 import shlex
 from pathlib import Path
@@ -8,6 +9,7 @@ import pytest
 
 from d2rpick.choice.pair.grades import VERDICTS
 from d2rpick.choice.pair.quality import Cause, Grade, Quality, omit_comparison
+from tests import variants
 from tests.command import (
     BOX,
     ENERGY,
@@ -414,7 +416,8 @@ def test_a_plan_of_short_flights_asks_for_shorter_windows_only_once() -> None:
     assert step == f"plan shorter windows too with d2rpick {shlex.join(shorter)}"
     assert "plan" not in find_line("next", *shorter)
     last = find_line("next", "plan", "--min-rigid", "0.002", *given, ENERGY)
-    assert last.startswith("no pair of this run can be used: every flight is too short")
+    assert last.startswith("no pair of this run can be used with --after 0.01, ")
+    assert "--min-rigid 0.002 (other values may allow one): every flight is" in last
 
 
 def test_the_step_of_a_plan_without_a_mass_is_not_another_tour() -> None:
@@ -499,7 +502,11 @@ def test_without_a_pair_the_better_one_is_that_of_its_flight() -> None:
 
 def test_a_plan_against_the_verdict_says_so() -> None:
     question = ("plan", "--part", "box", "--min-quality", "poor", MATSUM)
-    assert run(*question).stdout.startswith("do not use: planned nevertheless")
+    text = join_wrapped_lines(run(*question).stdout)
+    assert text.startswith("do not use: rigid from ")
+    assert "is planned only because of --min-quality poor" in text
+    # The next step is the same as without the option; it does not lead to the cards.
+    assert "-f card" not in find_line("next", *question)
 
 
 def test_a_study_of_pairs_that_cannot_be_used_fails_as_suggest_does() -> None:
@@ -533,3 +540,98 @@ def test_a_cure_is_given_once() -> None:
     times = ("--tr", "0.0001", "--td", "0.1", "--part", "all")
     text = run("verify", *times, str(SAMPLES / "oscillator" / "OSCT01.gz")).stdout
     assert "write the energies more often; write" not in " ".join(text.split())
+
+
+# A study leads to a better td of all runs, and gives a shared reason once.
+
+
+def test_a_study_at_a_poor_td_leads_to_the_better_td_of_all_runs() -> None:
+    runs = (ENERGY, str(SAMPLES / "energy.glstat"))
+    step = find_line("next", "study", "--td", "0.064", *runs)
+    better = run_json("suggest", "--td", "0.064", ENERGY)["better_td"]["td"]
+    expected = ("d2rpick", "study", "--td", f"{better:.6g}", *runs)
+    assert step == f"judge all runs at the better td with {shlex.join(expected)}"
+    followed = run(*expected[1:])
+    assert followed.stdout.startswith("use ")
+    assert "-td" not in find_line("td", *expected[1:])
+
+
+def test_a_study_gives_reasons_that_differ_only_in_numbers_once(tmp_path: Path) -> None:
+    runs = variants.write_variants(tmp_path)
+    text = join_wrapped_lines(run("study", "--td", "0.064", *runs).stdout)
+    (shared,) = re.findall(r"why (do not use in \d runs?: .*?) next ", text)
+    assert shared.startswith(f"do not use in {len(runs)} runs: ")
+    assert f"(numbers of {runs[0]})" in shared
+
+
+# A plan gives its reason in the first lines.
+
+
+@pytest.mark.parametrize(
+    "question",
+    [
+        (ENERGY,),
+        ("--part", "1,2", MATSUM),
+        ("--part", "box", MATSUM),
+        ("--part", "box", "--min-quality", "poor", MATSUM),
+    ],
+)
+def test_a_plan_gives_the_reason_of_suggest_in_its_first_lines(
+    question: tuple[str, ...],
+) -> None:
+    reason = find_line("why", "suggest", *question)
+    assert find_line("why", "plan", *question) == reason
+    first_lines = run("plan", *question).stdout.partition("\nnext")[0]
+    assert "why" in first_lines
+
+
+def test_a_flight_that_is_too_short_has_no_other_verdict() -> None:
+    question = ("plan", "--min-rigid", "0.3", BOX)
+    rows = re.findall(r"^ +\d .*", run(*question).stdout, re.MULTILINE)
+    assert rows
+    assert all("too short" in row and "use" not in row for row in rows)
+    assert "every flight is too short" in find_line("why", *question)
+    assert "with --min-rigid 0.3 (another value may allow one)" in find_line(
+        "next", *question
+    )
+
+
+# The page of an answer gives its next step.
+
+
+@pytest.mark.parametrize(
+    "question",
+    [
+        ("suggest", "--td", "0.064", ENERGY),
+        ("suggest", "--td", "0.0687534", ENERGY),
+        ("verify", "--tr", "0.0128853", "--td", "0.064", ENERGY),
+        ("verify", "--tr", "0.0135867", "--td", "0.0687534", ENERGY),
+        ("explore", "--td", "0.064", "--steps", "3", ENERGY),
+        ("plan", ENERGY),
+    ],
+    ids=" ".join,
+)
+def test_a_page_gives_the_next_step_of_its_answer(
+    question: tuple[str, ...], tmp_path: Path
+) -> None:
+    page = tmp_path / "page.html"
+    run(*question, "--report", str(page))
+    (step,) = re.findall(
+        r"<dt>next</dt><dd>(.*?)</dd>", page.read_text(encoding="utf-8")
+    )
+    assert html.unescape(step) == find_line("next", *question)
+
+
+# The better pair that verify names has no better pair itself.
+
+
+@pytest.mark.parametrize(("tr", "td"), [("0.006", "0.08"), ("0.02", "0.064")])
+def test_the_better_pair_of_verify_is_good_at_once(tr: str, td: str) -> None:
+    verdict = run_json("verify", "--tr", tr, "--td", td, ENERGY)
+    named = re.search(r"td = ([0-9.]+)", verdict["cure"])
+    assert named
+    followed = run_json("suggest", "--td", named[1], ENERGY)
+    assert (followed["verdict"], followed["cure"]) == ("use", "")
+    # A row of the candidates at this td names the same pair.
+    candidates = run_json("suggest", "--td", td, ENERGY)["candidates"]
+    assert verdict["cure"] in {row["cure"] for row in candidates}

@@ -150,7 +150,8 @@ def _warn_about_flight(situation: Situation) -> Iterator[Caution]:
             and flight.start is not None
             and flight.settled < flight.start
         ):
-            text += f" (the {flight.start - flight.settled:.3g} after {flight.settled:.6g} are not used, for safety)"
+            waited = f"{flight.start - flight.settled:.3g}"
+            text += f" (the energy settles at {flight.settled:.6g}; d2rpick waits for another {waited} to be safe)"
         yield Caution(
             "flight-from-energy", f"{text}; if you know it, give it as `after`"
         )

@@ -13,7 +13,9 @@ from d2rpick.choice.td.flights import find_flights
 from d2rpick.deck.geometry import compute_masses_and_steps
 from d2rpick.deck.model import DISCRETE, Inventory, PartData
 from d2rpick.deck.pieces import count_pieces
+from d2rpick.flight.internal_energy import find_largest
 from d2rpick.flight.momentum import find_parts_flying_together, list_deformable_parts
+from d2rpick.flight.window import LAST_DIGIT
 from d2rpick.histories.opening import Selection
 from d2rpick.histories.run import NO_STATES
 from d2rpick.histories.samples import find_window
@@ -170,6 +172,9 @@ def _measure_in_flight(
         return InFlight(flies)
     mean = float(inside.mean())
     scatter = float(inside.std()) / mean if mean > 0 else None
+    if find_largest(inside) <= LAST_DIGIT * find_largest(energy):
+        # The part does not vibrate: its energy in flight is only round-off of its energy in later contacts.
+        scatter = 0.0
     return InFlight(
         flies,
         mean,
@@ -438,7 +443,7 @@ def _list_remarks_on_switch(
         yield (
             "flies, so it can be rigid; vibrates, so its energy at tr must match td"
             if row.flight.deforms
-            else "flies, so it can be rigid; no longer vibrates, so any tr fits"
+            else "flies, so it can be rigid; does not vibrate, so any tr fits"
         )
     if data and data.section.formulations.keys() & {
         "solid",

@@ -45,6 +45,8 @@ if TYPE_CHECKING:
 # If windows of lengths w and W (the later one) are both used, two successive runs are rigid for w and w + W.
 # If only the later window is used, both runs are rigid for W, which is more in total if W > 2 w.
 _LONGER: Final = 2.0
+# The reason for leaving out a flight that is too short for a window begins with these words.
+TOO_SHORT: Final = "too short"
 
 
 class PlannedFlight(NamedTuple):
@@ -336,7 +338,7 @@ def _explain_short_window(rigid: float, shortest: float, margin: Margin) -> str:
     """Explain that a window is too short."""
     if np.isinf(margin.time):
         return (
-            "too short: a switch may shift the landing by more than the duration of the flight, so no margin before "
+            f"{TOO_SHORT}: a switch may shift the landing by more than the duration of the flight, so no margin before "
             "the contact is long enough; a given margin (`margin`) is used as it is"
         )
     if margin.time:
@@ -344,7 +346,7 @@ def _explain_short_window(rigid: float, shortest: float, margin: Margin) -> str:
     else:
         margin_text = ""
     return (
-        f"too short: rigid for {max(rigid, 0.0):.3g}{margin_text}; the shortest window allowed is "
+        f"{TOO_SHORT}: rigid for {max(rigid, 0.0):.3g}{margin_text}; the shortest window allowed is "
         f"{shortest:.3g} (`min_rigid`)"
     )
 

@@ -374,11 +374,13 @@ def _warn_about_window(
         caution for caution in warn_about_td(situation) if caution.code not in of_td
     )
     if inside[1] < window[1]:
-        kept_clear = window[1] - inside[1]
-        yield Caution(
-            "margin-kept",
-            f"td is at most {inside[1]:.6g}: a margin of {kept_clear:.3g} is kept before {window[1]:.6g}",
-        )
+        contact = situation.flight.end
+        if contact is not None and inside[1] < contact:
+            kept_before, limit = f"the contact at {contact:.6g}", contact
+        else:
+            kept_before, limit = f"{window[1]:.6g}", window[1]
+        margin = f"a margin of {limit - inside[1]:.3g} is kept before {kept_before}"
+        yield Caution("margin-kept", f"td is at most {inside[1]:.6g}: {margin}")
     if not any(map(_is_comparable, offers)):
         nothing = "no td in the range has an admissible tr"
         yield Caution("no-candidate", f"{nothing}{_explain_by_limits(suggestion)}")
