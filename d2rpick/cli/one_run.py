@@ -289,7 +289,7 @@ def explore(
 )
 @options.make_file_option(
     "--switched",
-    "Compare a finished switched run with the reference: file, folder or glob; repeatable.",
+    "Compare a finished switched run with the reference run: file, folder or pattern; repeatable.",
     many=True,
 )
 @options.make_click_option(
@@ -413,8 +413,8 @@ def parts(tr: float | None, td: float | None, request: Request, output: Output) 
 )  # fmt: skip
 @options.make_file_option(
     "--done",
-    "File with the windows in which HISTORY was switched, a line 'tr td' for each, or a journal.  d2rpick plans "
-    "the later windows; -f value, -f card and --write-deck contain both.",
+    "File with the windows in which HISTORY was switched, a line 'tr td' for each, or the journal of d2rpick drive.  "
+    "d2rpick plans the later windows; -f value, -f card and --write-deck contain both.",
 )
 @options.make_file_option(
     "--before",

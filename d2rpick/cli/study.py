@@ -52,7 +52,7 @@ if TYPE_CHECKING:
 )  # fmt: skip
 @options.make_file_option(
     "--resume",
-    "Keep finished runs in FILE, and skip unchanged runs that it contains.",
+    "Write the answers for finished runs to FILE, and reuse them for unchanged runs.",
     kind="output",
 )
 @options.make_click_option("jobs", Option(
