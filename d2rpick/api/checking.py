@@ -195,6 +195,7 @@ def find_findings(
             *(Caution("unknown-rule", remark) for remark in remarks),
         ),
         history=run.sources if run else None,
+        history_has_parts=bool(run and run.parts and not request.energy),
         notes=(*(judge.notes if judge else ()), *unused_settings),
         fail_on=Severity(fail_on),
         command=command,

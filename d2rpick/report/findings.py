@@ -13,6 +13,7 @@ from d2rpick.base.errors import Caution, make_printable, name_units
 from d2rpick.base.files import STDIN
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.choice.pair.grades import POOR
+from d2rpick.deck.beside import find_history_beside
 from d2rpick.report import keys, tables
 from d2rpick.report.fields import (
     Document,
@@ -54,6 +55,8 @@ _NOUNS: Final = (
 # This pattern is compiled at its first use, to keep start-up fast.
 # Name of the switched run in a command if the user has to give it.
 _SOME_RUN: Final = "SWITCHED_RUN"
+# Name of the history in a command if the user has to give it.
+_SOME_HISTORY: Final = "HISTORY"
 # Rule that reports switches without a time, and the end of its message if nothing else gives their time.
 _UNTIMED_RULE: Final = "D2R302"
 _NOT_JUDGED: Final = "not judged by time"
@@ -93,7 +96,8 @@ class Checks:
     """The findings in several decks; paths below ``root`` are shown relative to it.
 
     ``failed`` lists the decks that could not be read.  ``history`` lists the files from which the windows were judged;
-    None if there is none.  Findings less severe than ``fail_on`` are not failures.
+    None if there is none.  Findings less severe than ``fail_on`` are not failures.  ``history_has_parts`` is True if
+    the windows were judged by the energies of their parts.
     """
 
     results: Sequence[Checked]
@@ -102,6 +106,7 @@ class Checks:
     cautions: Sequence[Caution] = ()
     history: Sequence[str] | None = None
     fail_on: Severity = Severity.ERROR
+    history_has_parts: bool = False
 
 
 def as_table(checks: Checks, display: DisplayOptions) -> str:
@@ -167,13 +172,17 @@ def _name_next_step(checks: Checks) -> str:
             f"run the deck; {follow} shows meanwhile when the parts fly and are rigid"
         )
     if not any(result.cards for result in checks.results):
-        return "if the run is to be switched, choose the times with d2rpick plan HISTORY, and add the cards to the deck"
+        history, hint = _name_history(checks)
+        plan = tables.quote_shell_line(("d2rpick", "plan", *history))
+        return f"if the run is to be switched, choose the times with {plan}{hint}, and add the cards to the deck"
     if all(map(_has_only_untimed_cards, checks.results)):
         explain = tables.quote_shell_line(("d2rpick", "rule", _UNTIMED_RULE))
         return f"no card has a time that a history can judge; {explain} says how to have such switches judged"
     if checks.history is None:
+        # The history next to a deck that switches may be that of the switched run.
         command = tables.quote_shell_line(("d2rpick", "check", *decks))
-        return f"judge the times by the reference run: {command} --history HISTORY"
+        hint = f"(history of the reference run instead of {_SOME_HISTORY})"
+        return f"judge the times by the reference run: {command} --history {_SOME_HISTORY} {hint}"
     history = tables.make_positional(checks.history)
     grades = [
         window.decision.grade
@@ -189,10 +198,35 @@ def _name_next_step(checks: Checks) -> str:
     # The switched run is expected in the folder of the deck, unless this folder already contains the reference run.
     runs = [] if folders & of_history else [folder or os.curdir for folder in folders]
     switched = tables.make_positional(runs[:1] or [_SOME_RUN])
+    parts = _name_judged_parts(checks)
     line = tables.quote_shell_line(
-        ("d2rpick", "verify", "--switched", *switched, *history)
+        ("d2rpick", "verify", "--switched", *switched, *parts, *history)
     )
     return f"run the deck, and compare the run with {line}"
+
+
+def _name_history(checks: Checks) -> tuple[tuple[str, ...], str]:
+    """Return the history next to the only deck or, if there is none, a placeholder, and a hint to replace it."""
+    decks = [result.deck for result in checks.results]
+    history = find_history_beside(decks[0]) if len(decks) == 1 else None
+    if history:
+        return tables.make_positional([history]), ""
+    return (
+        _SOME_HISTORY,
+    ), f" (history of the reference run instead of {_SOME_HISTORY})"
+
+
+def _name_judged_parts(checks: Checks) -> tuple[str, ...]:
+    """Return the option that names the parts of the judged windows; empty if the whole model was judged."""
+    parts = {
+        window.part
+        for result in checks.results
+        for window in result.windows
+        if window.decision and window.part is not None
+    }
+    if not checks.history_has_parts or not parts:
+        return ()
+    return ("--part", ",".join(map(str, sorted(parts))))
 
 
 def as_ndjson(checks: Checks, display: DisplayOptions) -> str:

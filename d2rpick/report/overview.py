@@ -97,7 +97,7 @@ _RECORD: Final = {
     DO_NOT_USE: "do not use it to choose times",
 }
 # Advice if momenta are written but show no flight.
-_GIVE_END_OF_LOAD: Final = "if you know that the parts fly after a load, give the end of the load to d2rpick plan with --after"
+_GIVE_END_OF_LOAD: Final = "if you know that the parts fly after a load, give its end to d2rpick plan with --after"
 # Statement that no file names the unit of time.
 _UNNAMED: Final = "not named by the files: all values are in the units of the run"
 # Keys of the JSON output whose value is neither a list nor an object.

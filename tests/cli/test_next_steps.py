@@ -17,6 +17,7 @@ from tests.command import (
     ROLLOVER,
     ROOT,
     join_wrapped_lines,
+    put,
     run,
     run_json,
 )
@@ -228,7 +229,9 @@ def test_the_next_command_can_be_typed_as_it_stands(
 def test_the_shortest_way_to_a_card_of_connected_parts_merges_them(
     arguments: tuple[str, ...], tmp_path: Path
 ) -> None:
-    text = find_line("next", *arguments)
+    copy = put(tmp_path / "matsum", Path(MATSUM).read_bytes())
+    of_copy = (str(copy) if word == MATSUM else word for word in arguments)
+    text = find_line("next", *of_copy)
     assert "without it, parts that share nodes become separate rigid bodies" in text
     match = re.search(r"d2rpick (.*?) \(", text)
     assert match, text
@@ -239,6 +242,24 @@ def test_the_shortest_way_to_a_card_of_connected_parts_merges_them(
     card = "".join([step.stdout, *written])
     assert "         2         1      PART\n" in card
     assert "CHECK BEFORE USE" not in card
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [("plan", *FLYING), ("suggest", *FLYING), ("verify", *WITH_CARE, MATSUM)],
+    ids=" ".join,
+)
+def test_the_deck_next_to_a_history_is_named_in_the_next_command(
+    arguments: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    text = find_line("next", *arguments)
+    assert f"--deck {DECK}" in text
+    match = re.search(r"d2rpick (.*?)(?:\. Then|$)", text)
+    assert match, text
+    step = run(*shlex.split(match[1]))
+    written = [path.read_text() for path in Path("switched").glob("*.k")]
+    assert "         2         1      PART\n" in "".join([step.stdout, *written])
 
 
 def test_a_card_whose_parts_may_share_nodes_says_so_in_its_text() -> None:
@@ -465,9 +486,14 @@ def test_a_tr_during_the_load_is_named_as_the_only_reason() -> None:
 
 
 @pytest.mark.parametrize("deck", [(), ("--deck", str(SAMPLES / "switching.k"))])
-def test_parts_without_its_deck_asks_for_the_deck(deck: tuple[str, ...]) -> None:
+def test_parts_without_its_deck_asks_for_the_deck(
+    deck: tuple[str, ...], tmp_path: Path
+) -> None:
     step = find_line("next", "parts", *deck, MATSUM)
-    assert f"d2rpick parts --deck DECK {MATSUM}" in step
+    assert step.endswith(f"d2rpick parts --deck {DECK} {MATSUM}")
+    copy = str(put(tmp_path / "matsum", Path(MATSUM).read_bytes()))
+    step = find_line("next", "parts", *deck, copy)
+    assert f"d2rpick parts --deck DECK {copy}" in step
     assert "switching.k" not in step
 
 
