@@ -16,7 +16,7 @@ from d2rpick.base.files import STDIN
 from d2rpick.deck import find_main_decks
 from d2rpick.deck.radioss_files import list_run_files
 from d2rpick.deck.restarts import is_restart
-from d2rpick.report.findings import FINDING, Checks
+from d2rpick.report.findings_table import Checks
 from d2rpick.report.tables import make_positional
 from d2rpick.rules import RULES, Checked, Configuration, check_deck, find_configuration
 from d2rpick.rules.base import LS_DYNA, Severity, Unreadable
@@ -86,6 +86,9 @@ class Findings(Answer, Checks):
         >>> d2.check("sample_data/switching.k", history=history).to_frame()["rule"].tolist()
         ['D2R202', 'D2R203']
         """
+        # Imported here to keep start-up fast.
+        from d2rpick.report.findings import FINDING
+
         return build_frame(
             self.to_dict()["findings"], FINDING.keys, decks=list(self.decks)
         )

@@ -6,10 +6,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, Unpack
 
 from d2rpick.api import arguments
-from d2rpick.api.answer import RunAnswer, build_frame
+from d2rpick.api.answer import build_frame
 from d2rpick.api.asked import RunQuestion, ask_run, make_request
-from d2rpick.api.cards import CardOptions, Cards, JudgedCard, judge_and_print
+from d2rpick.api.cards import CardOptions, Cards
+from d2rpick.api.judged_cards import JudgedCard, judge_and_print
 from d2rpick.api.request import check_window
+from d2rpick.api.run_answer import RunAnswer
 from d2rpick.api.times import TimeArguments
 from d2rpick.base.errors import ArgumentError, DeckError
 from d2rpick.base.options import NOT_NEGATIVE

@@ -7,15 +7,12 @@ from functools import partial
 from typing import TYPE_CHECKING, Unpack
 
 from d2rpick.api import arguments
-from d2rpick.api.answer import RunAnswer, build_frame
+from d2rpick.api.answer import build_frame
 from d2rpick.api.asked import RunQuestion, ask_run, make_request
-from d2rpick.api.cards import (
-    CardOptions,
-    Cards,
-    JudgedCard,
-    judge_and_print as card_judged,
-)
+from d2rpick.api.cards import CardOptions, Cards
+from d2rpick.api.judged_cards import JudgedCard, judge_and_print as card_judged
 from d2rpick.api.request import MIN_MEAN_ENERGY, choose_time_or_window
+from d2rpick.api.run_answer import RunAnswer
 from d2rpick.api.times import TimeArguments
 from d2rpick.base.errors import ArgumentError
 from d2rpick.base.options import FRACTION
@@ -326,7 +323,7 @@ def judge_pair(
     switched: Run | None = None,
     min_mean_energy: float = MIN_MEAN_ENERGY,
 ) -> Verdict:
-    """Judge a pair. A finished switched run, if given, is compared as well, and defines times that are not given."""
+    """Judge a pair. A finished switched run is compared with the reference run, and supplies omitted times."""
     check_pair(tr, td, switched)
     switched_reference = switched and question.reference.like(
         switched.files, question.selection

@@ -142,7 +142,7 @@ class Overview(NamedTuple):
 
     @property
     def _is_spent(self) -> bool:
-        """True if parts were rigid and no flight begins after they were rigid."""
+        """True if parts were rigid and no flight begins after they have become deformable again."""
         last = max((end for _, end in self.rigid), default=None)
         return last is not None and all(
             flight.start < last for _, flight in self.flights

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import click
 
-from d2rpick.api.cards import Cards, JudgedCard, collect_cautions
 from d2rpick.api.request import (
     CHOOSING,
     CHOOSING_FOR_SETS,
@@ -45,6 +44,8 @@ from d2rpick.report.formats import FORMATS, WrittenDeck, write
 
 if TYPE_CHECKING:
     from d2rpick.api.asked import RunQuestion
+    from d2rpick.api.cards import Cards
+    from d2rpick.api.judged_cards import JudgedCard
     from d2rpick.api.plans import Plan
     from d2rpick.base.errors import Caution
 
@@ -175,6 +176,9 @@ def suggest(
         answer, lambda: answer.page(options.repeat_command(), request.judging(), cards)
     )
     if card:
+        # Imported here to keep start-up fast.
+        from d2rpick.api.judged_cards import collect_cautions
+
         judged_card = answer.printed(cards)
         if judged_card is None:
             new_cautions = []
@@ -530,6 +534,9 @@ def _select_new_cautions(card: JudgedCard | None, plan: Plan) -> list[Caution]:
     """Return the cautions about the card that the plan lacks, e.g. those about windows without a verdict."""
     if card is None:
         return []
+    # Imported here to keep start-up fast.
+    from d2rpick.api.judged_cards import collect_cautions
+
     failed = tuple(
         verdict
         for verdict in card.verdicts

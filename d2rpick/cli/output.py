@@ -28,7 +28,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from d2rpick.api.answer import Answer, Paged
-    from d2rpick.api.cards import Cards, JudgedCard
+    from d2rpick.api.cards import Cards
+    from d2rpick.api.judged_cards import JudgedCard
     from d2rpick.api.request import Request
     from d2rpick.api.runs import Run
     from d2rpick.base.errors import Caution

@@ -179,7 +179,7 @@ class RuleIds(CompletedText):
 
     def offer(self, ctx: click.Context) -> Iterable[tuple[str, str]]:  # noqa: ARG002  other subclasses use the argument
         """Return the rules with their summaries."""
-        from d2rpick.report.findings import list_rules
+        from d2rpick.report.rule_texts import list_rules
 
         rows = (line.split(maxsplit=2) for line in list_rules().split("\n"))
         return [(rule, summary) for rule, _, summary in rows]

@@ -62,7 +62,7 @@ def plan_legs(
 def write_bodies_off(nodes: Sequence[int]) -> Iterator[str]:
     """Yield the lines of a block that deactivates rigid bodies.
 
-    The OpenRadioss starter ignores a second such block that follows the first one directly.
+    One block contains all bodies, because the OpenRadioss starter ignores a second such block directly after the first.
     """
     if nodes:
         yield from ("/RBODY/OFF", *write_numbers(nodes))

@@ -1,7 +1,8 @@
-"""Print the cards of a first run that switches its parts by contact forces, by which the solver detects flights.
+"""Print the cards of a first run in which the solver detects flights from contact forces, and then switches the parts.
 
-Radioss: legs that sensors end by /STOP/LSENSOR (tried with a solver; docs/reference/first-run.md).  LS-DYNA: a pair of
-switch sets with CODE 2 (no contact force) and 4 (contact force), from published text.
+For Radioss, sensors end the engine runs with /STOP/LSENSOR (tested with OpenRadioss; docs/reference/first-run.md). For
+LS-DYNA, there is a pair of switch sets with CODE 2 (no contact force) and 4 (contact force), according to published
+keyword data; this was not tested.
 """
 
 from __future__ import annotations
@@ -102,14 +103,14 @@ def print_first_run_cards(
     wait : float
         Force-free time after which a flight is detected [time].
     reason : str
-        Origin of this time.
+        Text that states where this time comes from.
     after : float or None
         No part becomes rigid before this time [time].
 
     Returns
     -------
     PrintedCard
-        With notes for the user.
+        The cards with notes for the user.
 
     Raises
     ------

@@ -1,6 +1,6 @@
 """Read the data of an LS-DYNA deck to which switching cards refer: parts, sections, sets, materials and constraints.
 
-Columns: the vendor's keyword data as published in its Python library.
+The columns come from the vendor's keyword data as published in its Python library.
 """
 
 from __future__ import annotations
@@ -117,7 +117,7 @@ _MOST_ROWS: Final = 8
 class DeckPartSet(NamedTuple):
     """Members of a part set: parts, ranges of part ids, and other part sets.
 
-    ``problems`` are fields that cannot be read; with one of them the members are unknown.
+    ``problems`` contains fields that cannot be read; if there are any, the members are unknown.
     """
 
     parts: tuple[int, ...] = ()
@@ -140,7 +140,7 @@ class DeckParts:
     """Data of each part, and part sets, by id; None stands for a kind of set that cannot be read.
 
     ``all_known`` is False if an include was not read, a block is encrypted, or a keyword creates parts in a way that
-    cannot be read: a part that is missing here may then exist. ``problems`` are unreadable ids of parts and sets, and
+    cannot be read; the deck may then have further parts. ``problems`` contains unreadable ids of parts and sets, and
     unreadable numbers of includes.
     """
 
@@ -359,7 +359,8 @@ def _read_listed_ids(card: Card, options: Collection[str]) -> list[Value[int]]:
 class SectionCard(NamedTuple):
     """A *SECTION card: its element kind and its ELFORM.
 
-    ``first`` is the first number of its second line, ``layers`` the number of integration points through the thickness.
+    ``first`` is the first number of its second line, and ``layers`` the number of integration points through the
+    thickness.
     """
 
     kind: str

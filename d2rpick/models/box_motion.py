@@ -1,9 +1,9 @@
 """Integrate the motion of the box by central differences, with contact, as a truss or as one rigid body.
 
-The contact force is proportional to the penetration; friction follows Coulomb's law, smoothed at small speeds. The
-cushion of the curb crushes like honeycomb: at a constant force, irreversibly, until its depth is used up. In a drop
-there is only the ground. While it is switched the box, alone or with its step, moves as one body, with three equations
-in the plane.
+The contact force is proportional to the penetration; friction follows Coulomb's law, smoothed at low speeds. The
+cushion of the curb crushes like honeycomb: irreversibly and at a constant force until its depth is used up. In a drop
+test, there is only the ground. While it is switched, the box, alone or with its step, moves as one rigid body, which
+has three equations of motion in the plane.
 """
 
 from __future__ import annotations
@@ -93,8 +93,8 @@ class Sled:
 class Contact:
     """The contact forces on the points of a structure; the depth to which the cushion is crushed is kept as state.
 
-    ``released`` is the last time at which the sled pushed before the first contact with the ground; ``landings`` are
-    the intervals (start, end) in which the ground pushed [s].
+    ``released`` is the last time at which the sled exerted a force before the first ground contact [s]; ``landings``
+    are the intervals (start, end) with ground contact [s].
     """
 
     def __init__(self, structure: Structure, parameters: Parameters) -> None:
@@ -206,8 +206,8 @@ class Contact:
 class RigidPoints:
     """Points that move as one rigid body. At the switch, the body has the linear and angular momentum of the points.
 
-    ``arms`` from the centre of mass to the points, rotated with the body (n,) [m]; ``velocity`` of the centre [m/s];
-    ``spin`` from x to z [rad/s].
+    ``arms`` (n,) leads from the centre of mass to the points and rotates with the body [m]. ``velocity`` is that of the
+    centre of mass [m/s], and ``spin`` the angular velocity from x to z [rad/s].
     """
 
     def __init__(self, masses: Values, positions: Plane, velocities: Plane) -> None:
@@ -248,10 +248,10 @@ class RigidPoints:
 class Accounts:
     """Energy and momentum exchanged with the surroundings since time zero.
 
-    ``external_work`` of gravity and the sled, ``friction`` work of all contacts, energy of the ``walls`` (stored in
-    floor, curb and ground, and dissipated by the cushion), ``damping`` energy, ``lost`` kinetic energy of the
-    vibration at tr [J]; ``impulse`` [kg m/s] and ``angular_impulse`` about the origin, from x to z [kg m2/s], of
-    gravity, contact and damping.
+    All energies are in J: ``external_work`` of gravity and the sled, ``friction`` work of all contacts, energy of the
+    ``walls`` (stored in floor, curb and ground, and dissipated by the cushion), ``damping`` energy, and ``lost``
+    kinetic energy of the vibration at tr. ``impulse`` [kg m/s] and ``angular_impulse`` about the origin, from x to z
+    [kg m2/s], are those of gravity, contact and damping.
     """
 
     external_work: float = 0.0
@@ -266,9 +266,9 @@ class Accounts:
 class BoxMotion:
     """The state of a run: ``places`` (n,) at time step ``count``, ``velocities`` (n,) half a time step earlier.
 
-    A time step ``dt`` [s] is 1/``every`` of the output ``interval``; RangeError is raised if impossible. ``body`` is
-    the rigid body while there is one, else None; it contains the points of the box, and those of the step if the step
-    is rigid too.
+    The time step ``dt`` [s] is 1/``every`` of the output ``interval``; RangeError is raised if there is no such time
+    step. ``body`` is the rigid body, or None while there is none; it contains the points of the box, and those of the
+    step if the step is rigid, too.
     """
 
     def __init__(self, parameters: Parameters, interval: float) -> None:
@@ -313,7 +313,7 @@ class BoxMotion:
     def make_rigid(self, *, with_step: bool = False) -> None:
         """Make the box rigid, alone or together with the step.
 
-        The rigid points keep their momenta, their vibration stops, and their deformation is frozen.
+        The rigid points keep their total momenta, their vibration stops, and their deformation is frozen.
         """
         frozen_bars = (self.box, self.step) if with_step else (self.box,)
         self._deformable_bars = () if with_step else (self.step,)

@@ -123,7 +123,7 @@ def format_outlook(decision: Decision) -> str:
 
 
 def format_rigid_time(best: Candidate) -> str:
-    """Return the time for which the parts are rigid as text."""
+    """Format the time for which the parts are rigid."""
     return f"{best.rigid_time:.6g}, {best.rigid_fraction:.0%} of the simulated time"
 
 

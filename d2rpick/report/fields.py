@@ -192,9 +192,11 @@ class Document(NamedTuple):
     def whole(self) -> Kind:
         """The type of an object with all fields of the document."""
         head = (
-            Field("schema", Kind({"const": self.name})),
-            Field("tool_version", "text"),
-            Field("command", "texts"),
+            Field(
+                "schema", Kind({"const": self.name}), "name and number of the schema"
+            ),
+            Field("tool_version", "text", "version of d2rpick"),
+            Field("command", "texts", "arguments that reproduce the answer"),
         )
         schema = self.row.schema
         later = {*self.row.keys} - {*schema["required"]}

@@ -25,16 +25,16 @@ if TYPE_CHECKING:
 
 _EVIDENCE: Final = one_of(*(source for source in SOURCES if source != "given"))
 _FLIGHT: Final = row(
-    Field("start", "number", get=lambda flight: flight[1].start),
+    Field("start", "number", "start of the flight", lambda flight: flight[1].start),
     Field("end", "number?", "end of the flight; null if the record ends in flight",
           lambda flight: flight[1].end if flight[1].end_seen else None),
     Field("parts", maybe(many(keys.PART)), "parts that fly together; null for the whole model",
           lambda flight: flight[1].parts or None),
-    Field("source", _EVIDENCE, get=lambda flight: flight[0]),
+    Field("source", _EVIDENCE, "evidence for the flight", lambda flight: flight[0]),
 )  # fmt: skip
 _TIMES: Final = row(
-    Field("start", "number", get=lambda times: times[0]),
-    Field("end", "number", get=lambda times: times[1]),
+    Field("start", "number", "first time of the interval", lambda times: times[0]),
+    Field("end", "number", "last time of the interval", lambda times: times[1]),
 )
 _FORCE: Final = row(
     Field(
@@ -58,31 +58,35 @@ _PART: Final = row(
 )
 _SAMPLING: Final = row(
     *(
-        Field(key, get_kind("number", exclusiveMinimum=0))
-        for key in ("min", "median", "max")
+        Field(key, get_kind("number", exclusiveMinimum=0), f"{extent} output interval")
+        for key, extent in (
+            ("min", "shortest"),
+            ("median", "median"),
+            ("max", "longest"),
+        )
     )
 )
 DOCUMENT: Final = Document("d2rpick/info/1", "Answer of d2rpick info; times in the unit of the history.", row(
     keys.WARNINGS,
-    Field("source", get_kind("texts", minItems=1)),
+    Field("source", get_kind("texts", minItems=1), "files of the run"),
     Field("format", "text", "format; the formats of companion files are joined by ' + '"),
     Field("version", "text", "version of the solver; empty if no file contains it"),
-    Field("title", "text"),
+    Field("title", "text", "title of the run; empty if no file contains it"),
     Field("states", maybe(get_kind("integer", minimum=0)),
           "number of states; null if the time column is ambiguous. In this case, and for 0 states, the times are "
           "null"),
-    Field("time_start", "number?"), Field("time_end", "number?"),
-    Field("time_unit", "text", "empty if no file contains it"),
+    Field("time_start", "number?", "time of the first state"), Field("time_end", "number?", "time of the last state"),
+    Field("time_unit", "text", "unit of the times; empty if no file contains it"),
     Field("sampling", maybe(_SAMPLING),
           "output intervals; null for a single state"),
     Field("complete", "flag", "false if the file ends within a state"),
-    Field("channels", "texts"),
-    Field("parts", many(_PART)),
+    Field("channels", "texts", "names of the quantities in the files, such as internal_energy"),
+    Field("parts", many(_PART), "parts in the files"),
     Field("flights", many(_FLIGHT), "free flights, found from the best evidence in the files"),
     Field("should_write", "text?",
           "output to request so that the flights of single parts are known; null if the files contain it"),
     keys.HEALTH,
-    Field("notes", "texts"),
+    Field("notes", "texts", "what was left out or assumed when the files were read"),
     Field("verdict", keys.VERDICT, "whether this run is suitable for choosing switch times", later=True),
     Field("verdict_reason", "text", "reason for the verdict, as text", lambda overview: overview.reason, later=True),
     Field("contact_forces", many(_FORCE), "contacts and rigid walls whose forces are in the files", later=True),

@@ -87,7 +87,7 @@ WINDOW: Final = row(
         "number of the flight in the record, starting at 1",
         lambda row: row.number,
     ),
-    Field("flight_start", "number", get=lambda row: row.start),
+    Field("flight_start", "number", "start of the flight", lambda row: row.start),
     Field(
         "flight_end",
         "number?",
@@ -106,15 +106,30 @@ WINDOW: Final = row(
         "true if the evidence for the flight excludes contacts and loads",
         lambda row: row.flight.certain,
     ),
-    Field("status", one_of("supported", "re-plan", "done", "left-out")),
+    Field(
+        "status",
+        one_of("supported", "re-plan", "done", "left-out"),
+        "when to use the window: in the next run (supported), in a later run (re-plan), already used (done), or not "
+        "at all (left-out)",
+    ),
     Field(
         "reason",
         "text?",
         "reason why the window is not supported; for a window that is done, what happened after it",
     ),
-    Field("tr", "number?", get=lambda row: _get_time(row, 0)),
-    Field("td", "number?", get=lambda row: _get_time(row, 1)),
-    Field("rigid_time", "number?"),
+    Field(
+        "tr",
+        "number?",
+        "time at which the parts become rigid; null without a window",
+        lambda row: _get_time(row, 0),
+    ),
+    Field(
+        "td",
+        "number?",
+        "time at which the parts become deformable again; null without a window",
+        lambda row: _get_time(row, 1),
+    ),
+    Field("rigid_time", "number?", "td minus tr"),
     Field(
         "rigid_fraction", "number?", "rigid time as a fraction of the simulated time"
     ),
@@ -130,7 +145,8 @@ WINDOW: Final = row(
     Field(
         "basis",
         maybe(keys.BASIS),
-        get=lambda row: (now := _get_situation(row)) and now.basis,
+        "model of the vibration on which the choice is based",
+        lambda row: (now := _get_situation(row)) and now.basis,
     ),
     _BEST.field("kind")._replace(kind=maybe(keys.KIND)),
     *(
@@ -140,7 +156,8 @@ WINDOW: Final = row(
     Field(
         "kinetic_share",
         "number?",
-        get=lambda row: (now := _get_situation(row)) and now.kinetic_share,
+        "kinetic fraction K: fraction of the vibration energy that is kinetic at td",
+        lambda row: (now := _get_situation(row)) and now.kinetic_share,
     ),
     Field(
         "margin",
@@ -400,7 +417,7 @@ def list_next_steps(
 def _list_step_without_window(
     plan: RunPlan, question: RepeatedQuestion
 ) -> list[tuple[str, str]]:
-    """Return the next command of a plan without a window that can be used now."""
+    """Return the command to type next if no window of a plan can be used now."""
     rows = [row for row in plan.flights if row.answer and not row.done]
     if not rows:
         if plan.done:

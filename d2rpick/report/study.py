@@ -56,15 +56,17 @@ _JUDGED: Final[dict[str, Any]] = {
     "else": {"properties": {"tr": _NULL, "message": {"type": "string"}}},
 }
 PLAIN: Final = row(
-    Field("source", "text"),
-    Field("tr", "number?"), Field("tr_low", "number?"), Field("tr_high", "number?"),
-    Field("energy_td", "number?"),
-    Field("residual", "number?"),
-    Field("status", STATUS),
-    Field("message", "text?"),
-    Field("basis", maybe(keys.BASIS)),
-    Field("warnings", "texts"),
-    Field("time_unit", "text"),
+    Field("source", "text", "run, as given"),
+    Field("tr", "number?", "tr recommended for this run"),
+    keys.CANDIDATE.field("tr_low"),
+    keys.CANDIDATE.field("tr_high"),
+    Field("energy_td", "number?", "internal energy at td"),
+    Field("residual", "number?", "residual R of the pair of this run; null if unknown"),
+    Field("status", STATUS, "ok if a tr is recommended, otherwise why there is none"),
+    Field("message", "text?", "reason why no tr is recommended; null if status is ok"),
+    Field("basis", maybe(keys.BASIS), "model of the vibration on which the choice is based"),
+    Field("warnings", "texts", "warnings about this run"),
+    Field("time_unit", "text", "unit of the times; empty if no file contains it"),
     Field("td", "number?", "td of this run"),
     Field("record_end", "number?", "last time of the record"),
     Field("quality", keys.GRADE, "grade of the pair; null if there is no pair", later=True),
@@ -87,13 +89,15 @@ RUN: Final = row(
 _RUN: Final = row(
     *RUN.fields, name="run", later=("common_error", "record_end"), **_JUDGED
 )
+# Keys of the statistics of tr, with the words for them.
+_EXTENTS: Final = {"min": "smallest", "median": "median", "max": "largest"}
 _SHARED: Final = row(
     keys.WARNINGS,
     Field("td", "number?", "given td; null if each run has its own td"),
     Field("td_window", "span?", "range in which each run chose its td"),
-    Field("tr", row(*(Field(key, "number?") for key in ("min", "median", "max"))),
+    Field("tr", row(*(Field(key, "number?", f"{extent} tr") for key, extent in _EXTENTS.items())),
           "statistics of tr, for the runs that have a tr",
-          lambda answer: answer.spread or dict.fromkeys(("min", "median", "max"))),
+          lambda answer: answer.spread or dict.fromkeys(_EXTENTS)),
     Field("agree", "flag?", "true if the intervals from tr_low to tr_high of these runs overlap"),
     Field("common_tr", "number?",
           "median of tr, or the time nearest to it within all intervals, if the runs agree. Otherwise the earliest tr "
@@ -114,7 +118,8 @@ _SHARED: Final = row(
                                             "common_tr",
           lambda answer: answer.common.errors),
 )  # fmt: skip
-_RUNS: Final = Field("runs", many(RUN), get=lambda answer: list(add_errors(answer)))
+_RUNS: Final = Field("runs", many(RUN), "one entry for each run, in the order of the arguments",
+                     lambda answer: list(add_errors(answer)))  # fmt: skip
 _MEANING: Final = (
     "Answer of d2rpick study; times in the unit of the histories. With -f ndjson each run is a line that follows "
     "$defs/line; the last line follows $defs/last."
@@ -249,7 +254,7 @@ def build_run_table(answer: StudyOfRuns) -> tuple[list[str], list[list[tables.Ce
 
 
 def _explain_status(row: StudyRow) -> str:
-    """Return the message of a run without the name of the run or, failing that, the codes of its warnings, if any."""
+    """Return the message of a run, without the name of the run. If it has none, return the codes of its warnings."""
     text = row.message or ", ".join(row.warnings)
     return text.removeprefix(f"{row.source.rstrip('/')}: ")
 

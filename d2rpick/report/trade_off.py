@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from d2rpick.report.formats import DisplayOptions, RepeatedQuestion
 
 OFFER: Final = row(
-    Field("td", "number"),
+    keys.TD,
     Field("peak", "flag", "true if the energy has a peak at td"),
     Field("tr", "number?", "tr that suggest recommends for td; null if there is none"),
     Field("error", "size?",
@@ -39,9 +39,7 @@ OFFER: Final = row(
           "a longer rigid time with at most the same error"),
     Field("recommended", "flag", "true for the pair that suggest recommends if td is not given"),
     *keys.QUALITY,
-    Field("basis", keys.BASIS),
-    Field("energy_td", "number"),
-    Field("kinetic_share", maybe(keys.SHARE)),
+    *(keys.MECHANICS.field(key) for key in ("basis", "energy_td", "kinetic_share")),
     *(field._replace(kind=maybe(field.kind)) for field in keys.CANDIDATE.of_part(
         lambda offer: offer.best, ("kind", *keys.MEASURES, "tr_low", "tr_high", "same_swing"))),
     Field("reason", "text?", "reason why no tr is recommended", lambda offer: offer.answer.why_none or None),
@@ -289,14 +287,14 @@ def _describe_step(trade_off: TradeOff, requested: Offer) -> str:
     return f"{distance} {error_change} and {cost_change}"
 
 
-DOCUMENT: Final = Document("d2rpick/explore/1", "Answer of d2rpick explore; times in the unit of the history.", row(
+DOCUMENT: Final = Document("d2rpick/explore/2", "Answer of d2rpick explore; times in the unit of the history.", row(
     *keys.FRAME,
     Field("td", "number?", "given td", lambda trade_off: trade_off.requested and trade_off.requested.td),
     Field("td_window", "span",
           "range in which td was explored: the given range, or the longest flight up to the margin before the contact"),
     *keys.MECHANICS.of_part(lambda trade_off: trade_off.situation, ("flight", "oscillator", "modes")),
     Field("answer", "text", "summary of the answer in one sentence", give_answer),
-    Field("recommended", maybe(keys.TIMES)),
+    Field("recommended", maybe(keys.TIMES), "recommended pair; null if there is none"),
     Field("start", "number?",
           "td with which the others are compared: the given td, otherwise the td with the largest saving",
           lambda trade_off: trade_off.start and trade_off.start.td),
@@ -353,7 +351,7 @@ def _describe_cost_change(start: Offer, step: Offer) -> str:
 
 
 def _format_offer_error(offer: Offer) -> str:
-    """Return the error of a proposed pair with its name."""
+    """Return the name and the value of the error of a proposed pair, such as "residual 0.02"."""
     if offer.error is None:
         return "an energy above twice its mean"
     if offer.basis == "energy":

@@ -26,7 +26,7 @@ def measure_hidden_pairs(
     """Return the vibration energy that shows no lines but decays like the ``level``, relative to the level [-].
 
     The lines of two modes with equal frequencies and opposite phases cancel each other, so their energy looks static.
-    But static energy stays as it is, while that of modes decays with all others.
+    But static energy is constant, whereas the energy of these modes decays like that of all others.
 
     Parameters
     ----------
@@ -55,7 +55,8 @@ def measure_hidden_pairs(
 def find_most_hidden(rest: Samples) -> float:
     """Return the largest vibration energy that lines hidden in the misfit (n,) of a fit could have [energy].
 
-    None of them is higher than the highest line of the rest, and together they are no more than the rest.
+    No hidden line is higher than the highest line of the misfit, and the power of all of them is at most that of the
+    misfit.
     """
     highest = 2 * float(np.abs(np.fft.rfft(rest)).max()) / rest.size
     most_together = np.sqrt(2 * np.mean(rest**2) / _HIDDEN_LINES)

@@ -29,7 +29,7 @@ _LOOSE_TURNS: Final = 0.5
 class LineScatter:
     """Standard deviation of the squared residual for one interpretation ``reading`` of the lines on a ``grid``.
 
-    Neighbouring states have the share ``systematic`` of the misfit in common [-].
+    ``systematic`` is the fraction of the misfit that neighbouring states have in common [-].
     """
 
     reading: Reading
@@ -80,7 +80,7 @@ class LineScatter:
     def _compute_gradient(self, tr: Samples, td: Samples) -> Samples:
         """Return the derivatives of the squared residual by all parameters, shape (n, p) [1/energy, time/1].
 
-        R^2 = 1 + [V(tr) - 2 V(m) + H(m) - C(tr, td)] / H(td), the small change of U within a period left out.
+        R^2 = 1 + [V(tr) - 2 V(m) + H(m) - C(tr, td)] / H(td), which neglects the small change of U within a period.
         """
         reading = self.reading
         lines = reading.spectrum.lines

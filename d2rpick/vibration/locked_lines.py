@@ -40,8 +40,9 @@ _STRONGEST, _HARMONICS = 3, (2, 3, 4, 5)
 class StretchLine(NamedTuple):
     """The ``line`` that arises because the mode of the line ``of_mode`` vibrates about a static deformation.
 
-    ``swings`` is True if the stretch swings about its mean; the energy is then the mean of what swings, in two lines.
-    ``is_exact`` is False if the rates differ by more than scatter can make them: a solver's structure, or two modes.
+    ``energy`` is the mean energy of the static deformation [energy]. ``swings`` is True if this deformation oscillates
+    slowly about its mean; it then causes two lines, which share its mean energy. ``is_exact`` is False if the frequency
+    of the line differs from half the frequency of the mode's own line by more than scatter explains.
     """
 
     line: int
@@ -56,9 +57,10 @@ def find_stretches(
 ) -> tuple[StretchLine, ...]:
     """Find the lines of modes that vibrate about a static deformation, as in a rotating body.
 
-    A mode q about q0 has the energy q0^2 + 2 q0 q + q^2: a further line at half the rate and half the phase of its own.
-    In free flight of a body that does not spin, the energy is stationary at rest, whatever the residual stress, and has
-    no such line. A stretch that swings itself, as that of a part on a hinge, has two such lines, one on each side.
+    A mode q about q0 has the energy q0^2 + 2 q0 q + q^2, i.e. a further line with half the frequency and half the phase
+    of the mode's own line. In free flight of a body that does not spin, the elastic energy is stationary at equilibrium
+    despite residual stresses, so there is no such line. A static deformation that oscillates slowly, like that of a
+    part on a hinge, causes two such lines, one on each side.
     """
     size = np.abs(lines.weights)
     rate = lines.poles.imag
@@ -100,9 +102,9 @@ def _find_side_lines(
 ) -> list[StretchLine]:
     """Find the sidebands of modes that vibrate about a slowly oscillating deformation.
 
-    A stretch q0 cos(s t + f) gives a mode two further lines, at its rate plus s and less s.  Both are equally high, and
-    their rates and phases add up to those of the mode's own line.  The energy of the stretch itself has lines at
-    multiples of s, which are no modes either.
+    A deformation q0 cos(s t + f) gives a mode two further lines, at the mode's frequency plus and minus s. Both are
+    equally high, and their frequencies and phases add up to those of the mode's own line. The energy of the deformation
+    itself has lines at multiples of s, which are not modes either.
     """
     size = np.abs(lines.weights)
     rate = lines.poles.imag
@@ -136,9 +138,10 @@ def _find_side_lines(
 class ThirdHarmonic(NamedTuple):
     """The third harmonic of a line whose second harmonic has a locked phase; all heights refer to mid-window.
 
-    A stretch has a line and its second harmonic, and so has a spring that stiffens; a third harmonic has only the
-    spring.  ``expected`` is its height for that spring, ``measured`` what the record has there in phase with the first
-    line, ``scatter`` that of a height [energy]; ``second`` is the height of the second harmonic over the first line.
+    Both a static deformation and a stiffening spring cause a line with a second harmonic, but only the spring causes a
+    third one. ``second`` is the height of the second harmonic relative to the first line [-]. ``expected`` is the
+    height of the third harmonic of a stiffening spring, and ``measured`` the height in the record in phase with the
+    first line [energy]. ``scatter`` is the standard deviation of a height [energy].
     """
 
     second: float
@@ -169,11 +172,11 @@ def measure_third_harmonic(
     Parameters
     ----------
     stretch : StretchLine
-        The two lines.
+        The line and its second harmonic, the line ``of_mode``.
     spectrum : Spectrum
         Fitted to the grid of ``time`` (n,) [time].
     scatter : float
-        Of the height of a line [energy].
+        Standard deviation of the height of a line [energy].
     """
     middle = (time[0] + time[-1]) / 2
     lines = spectrum.lines

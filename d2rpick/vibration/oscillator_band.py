@@ -25,16 +25,16 @@ def residual_band(
 ) -> tuple[Samples, Samples, Samples]:
     """Return the residual of each tr (n,) with its lower and upper bound [-].
 
-    If scatter lets the square reach below zero, the middle of the rest is stated: a peak chosen from noise is not
-    exact.  A hidden mode is in opposite phase in the worst case, and absent in the best.  If it may raise the residual
-    above 0.25, the middle of what is above is stated.
+    If noise makes the band of the square reach below zero, the middle of its remainder is returned, because an extremum
+    chosen from noise is not exact. The upper bound assumes a hidden mode in opposite phase, the lower bound none. If a
+    hidden mode may raise the residual above 0.25, half of its effect is included in the residual.
 
     Parameters
     ----------
     fit : Identification
-        Accepted.
+        An accepted fit.
     stated : array of shape (n,)
-        Residuals by its mode [-].
+        Residuals according to the fitted mode [-].
     tr : array of shape (n,)
         [time]
     td : float or array of shape (n,)
@@ -73,7 +73,8 @@ def _count_opposed(fit: Identification, tr: Samples, td: Samples | float) -> Sam
 def _count_decayed(fit: Identification, tr: Samples, td: Samples | float) -> Samples:
     """Return the squared residual of a mode that the fit omits at tr and that has decayed by td [-].
 
-    The deformation at tr holds its energy, which is compared with the vibration that is left at td.
+    At tr, the deformation contains the energy of this mode, which is compared with the remaining vibration energy at
+    td.
     """
     assert fit.mode is not None
     if fit.deviations.size == 0:
@@ -87,7 +88,7 @@ def _compute_deviation(
 ) -> Samples:
     """Return the standard deviation of the squared residual for each tr (n,), due to uncertain fitted parameters [-].
 
-    The covariance is scaled to a unit diagonal first: its parameters have different units.
+    The covariance is first scaled to a unit diagonal, because the parameters have different units.
     """
     assert fit.mode is not None
     sizes = np.sqrt(np.diag(fit.covariance))

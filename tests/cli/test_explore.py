@@ -18,7 +18,7 @@ from tests.energies import require
 from tests.json_schemas import run_json_checked
 
 WINDOW = ("--td-window", "0.06", "0.07", "--steps", "10")
-SCHEMA = json.loads((ROOT / "d2rpick/schemas/explore-1.json").read_text("utf-8"))
+SCHEMA = json.loads((ROOT / "d2rpick/schemas/explore-2.json").read_text("utf-8"))
 
 
 @pytest.mark.slow

@@ -46,8 +46,9 @@ _CHEAP: Final = 0.1
 class InFlight(NamedTuple):
     """Data of one part in one flight; energies are None if they are not written or the part has none.
 
-    ``scatter`` is the standard deviation of the internal energy over its mean [-]; ``change`` is its value at the end
-    minus that at the start [energy].  ``landing`` is the energy that the part takes up at the start of the landing.
+    ``scatter`` is the standard deviation of the internal energy divided by its mean [-]; ``change`` is the energy at
+    the end minus that at the start [energy]. ``landing`` is the energy that the part absorbs at the start of the
+    landing [energy].
     """
 
     flies: bool | None = None
@@ -65,7 +66,8 @@ class InFlight(NamedTuple):
 class PartFacts(NamedTuple):
     """Data of one part from the history; ``has_energy`` is None if its energy is not written.
 
-    ``held`` names the support that acts on it in the longest flight, or at the end of a record without flights.
+    ``held`` names the support that acts on the part in the longest flight or, without flights, at the end of the
+    record.
     """
 
     part: Part
@@ -78,8 +80,8 @@ class PartFacts(NamedTuple):
 class RunFacts(NamedTuple):
     """Data of all parts from the history.
 
-    ``flights`` are (start, end) [time], ``longest`` is the index of the longest one, None if there are no flights.
-    ``reason`` states why there are no parts or no flights.
+    ``flights`` contains (start, end) of each flight [time], and ``longest`` the index of the longest flight; None if
+    there are no flights. ``reason`` states why there are no parts or no flights.
     """
 
     parts: Mapping[int, PartFacts]
@@ -96,7 +98,7 @@ def collect_facts(run: OpenedRun, settings: Settings) -> RunFacts:
     run : Run
         The reference run.
     settings : Settings
-        Options for the search for flights if momenta do not show them.
+        Options for the search for flights, which are needed if momenta do not show them.
 
     Returns
     -------
@@ -208,9 +210,10 @@ def _read_masses(run: OpenedRun) -> dict[int, float]:
 class PartRow(NamedTuple):
     """All data of one part; unknown values are None.
 
-    ``cost_share`` is the share of its elements in the cost of all elements [-], ``smallest_step`` its smallest stable
-    time step [time]; ``mass_source`` and ``step_source`` name their sources.  ``flights`` has the data of the part in
-    each flight, ``flight`` those in the longest.  ``merge_with`` is the part whose rigid body it joins.
+    ``cost_share`` is the fraction of the cost of all elements that is due to those of the part [-]. ``smallest_step``
+    is the smallest stable time step of the part [time]; ``mass_source`` and ``step_source`` name the sources of the
+    mass and of this time step. ``flights`` contains the data of the part in each flight, and ``flight`` those in the
+    longest flight. ``merge_with`` is the part whose rigid body this part joins.
     """
 
     id: int
@@ -458,7 +461,7 @@ def compute_step_growth(
 ) -> float | None:
     """Return the smallest growth factor of the time step while the ``switched`` parts are rigid, at least 1 [-].
 
-    The result is None if the time step of a part that stays deformable is unknown, infinite if no part stays
+    The result is None if the time step of a part that remains deformable is unknown. It is infinite if no part remains
     deformable.
     """
     computed = [

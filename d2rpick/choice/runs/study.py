@@ -76,7 +76,7 @@ _DEFAULT = Selection()
 class Question:
     """The question that is asked of every run; ``td`` is a time, a time range, or None for the longest flight.
 
-    With ``curve`` an outline of the energy is kept for drawing.
+    If ``curve`` is True, an outline of the energy is kept for drawing.
     """
 
     td: float | tuple[float, float] | None
@@ -99,13 +99,13 @@ class Stamp(NamedTuple):
 class StudyRow:
     """The answer for one run, with times in the unit of its history; None if a value is unknown.
 
-    ``status`` is "ok"; "none": nothing can be recommended; "unreadable"; "out-of-range": the record does not reach td
-    or is too short; "failed": its process died; "internal-error": the program failed.  ``message`` gives the reason for
-    a status other than "ok"; ``warnings`` are codes.  ``quality`` to ``cure`` are those of the suggestion for its pair.
-    ``td`` is that of the run, ``better_td`` that of a better pair.  ``acceptable`` are the windows of acceptable tr,
-    shape (n, 2), ``alike`` those in which the error is at most 0.05 above that of its tr, ``profile`` the errors, shape
-    (2, m).  ``files`` were read, up to ``record_end``; ``curve`` is an outline of the energy, shape (2, k), if it was
-    requested.
+    ``status`` is "ok", "none" (no pair can be recommended), "unreadable", "out-of-range" (the record does not reach td
+    or is too short), "failed" (its process died), or "internal-error" (the program failed). ``message`` gives the
+    reason for a status other than "ok"; ``warnings`` contains codes. The fields from ``quality`` to ``cure`` are those
+    of the suggestion for this run; ``better_td`` is the td of a better pair [time]. ``acceptable`` contains the windows
+    of acceptable tr, shape (n, 2), and ``alike`` the windows in which the error exceeds that of the run's own tr by at
+    most 0.05. ``profile`` contains the errors, shape (2, m). ``files`` were read up to ``record_end`` [time].
+    ``curve`` is an outline of the energy, shape (2, k), if it was requested.
     """
 
     source: str
@@ -142,9 +142,9 @@ class StudyRow:
 class Common(NamedTuple):
     """The tr for all judged runs, with the window that all runs share [time]; None, with a reason, if no tr suits all.
 
-    ``keeps_tolerance``: tr lies within the timing tolerance of every run, so that no error exceeds the error at the
-    run's own tr by more than 0.05.  ``errors`` are the errors at this tr, one for each run: residuals, or
-    level errors on the energy alone [-]; None if the run was not judged.
+    ``keeps_tolerance`` is True if tr lies within the timing tolerance of every run, so that no error exceeds the error
+    at the run's own tr by more than 0.05. ``errors`` contains the error of each run at this tr [-]; None if the run was
+    not judged. It is a residual or, if only the energy is known, a level error.
     """
 
     tr: float | None
@@ -166,7 +166,8 @@ class Spread(NamedTuple):
 class StudyOfRuns:
     """The answer of ``study``; ``agree`` is True if the tr intervals of all runs overlap, None if there is no tr.
 
-    ``td`` is None if each run has its own, chosen in ``td_window``, or in its longest flight if that is None too.
+    ``td`` is None if each run has a td of its own, which is chosen in ``td_window`` or, if this is None, in the longest
+    flight of the run.
     """
 
     td: float | None
@@ -468,9 +469,10 @@ def _warn_about_runs(rows: Sequence[StudyRow], common: Common) -> Iterator[Cauti
 def choose_common_tr(rows: Sequence[StudyRow]) -> Common:
     """Choose one tr for all judged runs: the median if the tr agree, otherwise the earliest tr that suits all runs.
 
-    A tr suits all runs if it keeps the timing tolerance of every run.  If no tr does, choose the earliest tr that is
-    acceptable in all runs and at which the largest loss of a run is hardly larger than necessary.  Unless the runs
-    agree, the tr has few digits, which costs at most 1/1000 of the rigid time.
+    A tr suits all runs if it lies within the timing tolerance of every run. If no tr does, the result is the earliest
+    tr that is acceptable in all runs and for which the largest error increase of any run is hardly larger than
+    necessary. Unless the tr of the runs agree, the result is rounded to few digits, which costs at most 1/1000 of the
+    rigid time.
     """
     judged = [row for row in rows if row.judged]
     if not judged:
@@ -568,7 +570,7 @@ def _is_in_windows(windows: Samples, time: float) -> bool:
 def find_outliers(rows: Sequence[StudyRow]) -> tuple[StudyRow, ...]:
     """Return the outliers: first the judged runs without any tr, then the runs whose tr lies beyond Tukey's fences.
 
-    The farthest from the median come first.
+    The runs whose tr is farthest from the median come first.
     """
     without = [row for row in rows if row.judged and row.tr is None]
     chosen = [(row, row.tr) for row in rows if row.tr is not None]

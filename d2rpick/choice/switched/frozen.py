@@ -1,7 +1,8 @@
 """Recognise a switched run by its energy alone, which is constant while the parts are rigid.
 
-At the release nothing vibrates, so all vibration energy is strain energy, and the internal energy can only fall.  This
-distinguishes a rigid window from a flight in which nothing vibrates: the contact that ends such a flight adds energy.
+At td, the parts have no vibration velocity, so all vibration energy is strain energy, and the internal energy can only
+fall. This distinguishes a rigid window from a flight in which nothing vibrates, because the contact that ends such a
+flight adds energy.
 """
 
 from __future__ import annotations
@@ -59,7 +60,7 @@ def _is_frozen(energy: Samples, stretch: slice, limit: float, rounding: float) -
 def refuse_switched(history: History, start: float | None, td: float) -> None:
     """Raise RangeError if the parts were rigid at some time from the start of the flight to td [time].
 
-    An unknown ``start`` is that of the record.
+    If ``start`` is unknown, the test begins at the start of the record.
     """
     earliest = history.start if start is None else start
     rigid = [
