@@ -114,7 +114,7 @@ def name_step_to_card(
 
     If the files show which parts are ``flying`` but no part or energy was chosen, the step is to choose the parts.
     """
-    from d2rpick.deck.printing import SOLVERS, find_solver
+    from d2rpick.deck.printing import SOLVERS, find_solver, names_solver
 
     is_radioss = SOLVERS[find_solver(history.format)].switches == "node"
     is_chosen = question.parts or "--energy" in question.options
@@ -139,7 +139,10 @@ def name_step_to_card(
         hint = f" (main nodes of your rigid bodies instead of {_SOME_NODE})"
     elif not history.parts:
         words = (*words, "--part", _SOME_PART)
-        hint = f" (ids of your parts instead of {_SOME_PART}; add --merge ID if parts share nodes)"
+        of_radioss = ""
+        if not names_solver(history.format):
+            of_radioss = f"; for a Radioss run, --solver radioss --node {_SOME_NODE} instead of --part {_SOME_PART}"
+        hint = f" (ids of your parts instead of {_SOME_PART}; add --merge ID if parts share nodes{of_radioss})"
     elif needs_deck(history, settings):
         deck = name_deck_of_run(question, _NEEDS_DECK)
         words = (*words, "--deck", deck.name)
@@ -278,7 +281,8 @@ def name_step_after_card(
     if worst is not None and worst.verdict == DO_NOT_USE:
         return f"choose other times with {write_command(question, 'suggest')}"
     if card.has_engine_files:
-        action, name = "put these files next to the starter deck", "starter deck"
+        action = "save the lines below each '# ---- NAME' as the file NAME next to the starter deck"
+        name = "starter deck"
     else:
         action, name = "add these cards to the main deck", "main deck"
     main_deck = (
