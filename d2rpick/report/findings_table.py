@@ -145,11 +145,12 @@ def _name_next_step(checks: Checks) -> str:
     # The switched run is expected in the folder of the deck, unless this folder already contains the reference run.
     runs = [] if folders & of_history else [folder or os.curdir for folder in folders]
     switched = tables.make_positional(runs[:1] or [_SOME_RUN])
+    hint = "" if runs else f" (folder of the switched run instead of {_SOME_RUN})"
     parts = _name_judged_parts(checks)
     line = tables.quote_shell_line(
         ("d2rpick", "verify", "--switched", *switched, *parts, *history)
     )
-    return f"run the deck, and compare the run with {line}"
+    return f"run the deck, and compare the run with {line}{hint}"
 
 
 def _name_history(checks: Checks) -> tuple[tuple[str, ...], str]:

@@ -259,9 +259,8 @@ def name_step_after_refusal(
     missing = situation.together.not_chosen.parts if question.parts else ()
     if missing:
         parts = (*(situation.history.parts or ()), *missing)
-        line = write_command(
-            question, "suggest", new_parts=[str(part.id) for part in parts]
-        )
+        ids = sorted(part.id for part in parts)
+        line = write_command(question, "suggest", new_parts=[*map(str, ids)])
         return f"judge the parts that vibrate together with {line}"
     return otherwise
 
@@ -294,7 +293,10 @@ def name_step_after_card(
         action = f"these times were not judged, because no history was given; {action}"
     files = make_positional([main_deck.name])
     line = quote_shell_line(("d2rpick", "check", *question.checking, *files))
-    if is_separate:
+    if is_separate and not main_deck.hint:
+        again = f"print the card again with --deck {main_deck.name}"
+        action = f"if these parts share nodes, {again}, which merges them; {action}"
+    elif is_separate:
         action = f"if these parts share nodes, print the card again with --merge ID; {action}"
     return f"{action}, then check it with {line}{main_deck.hint}"
 

@@ -622,6 +622,37 @@ def test_a_flight_that_is_too_short_has_no_other_verdict() -> None:
     )
 
 
+# Commands that follow each other do not contradict each other.
+
+
+@pytest.mark.parametrize("history", [EXCEL, "loaded"])
+def test_info_does_not_offer_a_run_that_suggest_refuses(
+    history: str, request: pytest.FixtureRequest
+) -> None:
+    name = history if history == EXCEL else request.getfixturevalue(history)
+    assert run_json("suggest", name)["verdict"] == "do not use"
+    overview = run_json("info", name)
+    assert overview["verdict"] == "do not use"
+    assert "gravity or another load" in overview["verdict_reason"]
+    assert "write the mass" in find_line("to improve", "info", name)
+
+
+@pytest.mark.parametrize(("tr", "td"), [("0.02", "0.2"), ("0.05", "0.36")])
+def test_the_findings_of_check_name_the_pair_of_the_verdict(
+    tr: str, td: str, tmp_path: Path
+) -> None:
+    card = run("card", "--tr", tr, "--td", td, "--part", "1,2").stdout
+    deck = put(tmp_path / "main.k", card)
+    question = ("check", str(deck), "--history", MATSUM, "--select", "D2R2")
+    report = run_json(*question)
+    cures = {window["cure"] for window in report["windows"]}
+    (pair,) = {tuple(re.findall(r"t[rd] = ([0-9.]+)", cure)) for cure in cures}
+    assert report["findings"]
+    for finding in report["findings"]:
+        named = re.search(r"use td = ([0-9.]+) with tr = ([0-9.]+)", finding["message"])
+        assert named is None or (named[2], named[1]) == pair
+
+
 # The page of an answer gives its next step.
 
 
