@@ -265,8 +265,7 @@ def give_answer(trade_off: TradeOff) -> str:
         quality_text = f"td = {requested.td:.6g} has no admissible tr"
     else:
         quality_text = f"td = {requested.td:.6g}: {_format_offer_error(requested)}"
-    separator = ". " if trade_off.step is None else "; "
-    return f"{quality_text}{separator}{_describe_step(trade_off, requested)}"
+    return f"{quality_text}; {_describe_step(trade_off, requested)}"
 
 
 def _describe_step(trade_off: TradeOff, requested: Offer) -> str:

@@ -102,10 +102,10 @@ class StudyRow:
     ``status`` is "ok", "none" (no pair can be recommended), "unreadable", "out-of-range" (the record does not reach td
     or is too short), "failed" (its process died), or "internal-error" (the program failed). ``message`` gives the
     reason for a status other than "ok"; ``warnings`` contains codes. The fields from ``quality`` to ``cure`` are those
-    of the suggestion for this run; ``better_td`` is the td of a better pair [time]. ``acceptable`` contains the windows
-    of acceptable tr, shape (n, 2), and ``alike`` the windows in which the error exceeds that of the run's own tr by at
-    most 0.05. ``profile`` contains the errors, shape (2, m). ``files`` were read up to ``record_end`` [time].
-    ``curve`` is an outline of the energy, shape (2, k), if it was requested.
+    of the suggestion for this run. ``td`` is that of this run, and ``better_td`` that of a better pair. ``acceptable``
+    contains the windows of acceptable tr, shape (n, 2), and ``alike`` the windows in which the error exceeds that of
+    the run's own tr by at most 0.05. ``profile`` contains the errors, shape (2, m). ``files`` were read up to
+    ``record_end`` [time]. ``curve`` is an outline of the energy, shape (2, k), if it was requested.
     """
 
     source: str
