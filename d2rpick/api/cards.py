@@ -41,8 +41,8 @@ if TYPE_CHECKING:
 
         ``solver`` is ``"ls-dyna"``, ``"radioss"`` or ``"radioss-sensors"``; the default is the solver that wrote the
         history. With the id of a ``contact`` or ``wall``, it may also be ``"ls-dyna-contact"`` or
-        ``"radioss-contact"``. ``step_cap`` is the largest time step while the parts are rigid. For LS-DYNA, ``merge`` is
-        the lead part into which all others are merged, and ``swset`` contains the ids of the two switch sets of the
+        ``"radioss-contact"``. ``step_cap`` is the largest time step while the parts are rigid. For LS-DYNA, ``merge``
+        is the lead part into which all others are merged, and ``swset`` contains the ids of the two switch sets of the
         first window. For Radioss, ``node`` contains the main nodes of the rigid bodies; ``end`` and ``name`` are those
         of the run.
         """

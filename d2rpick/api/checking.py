@@ -39,7 +39,8 @@ class Findings(Answer):
 
     ``results`` contains the result of each deck, and ``failed`` the decks that could not be read. Paths below ``root``
     are shown relative to it. ``history`` contains the files from which the windows were judged; it is None if there are
-    none. Findings less severe than ``fail_on`` are not failures.
+    none. Findings less severe than ``fail_on`` are not failures. ``history_has_parts`` is True if the windows were
+    judged by the energies of their parts.
 
     Each of the ``findings`` has ``rule``, ``severity``, ``message``, ``file``, ``line`` and ``column``. ``windows``
     contains the windows in which parts are rigid. ``notes`` reports unused settings, and what was omitted or assumed
@@ -52,6 +53,7 @@ class Findings(Answer):
     cautions: tuple[Caution, ...] = ()
     history: Sequence[str] | None = None
     fail_on: Severity = Severity.ERROR
+    history_has_parts: bool = False
     command: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     kind = "findings"
@@ -210,6 +212,7 @@ def find_findings(
             *(Caution("unknown-rule", remark) for remark in remarks),
         ),
         history=run.sources if run else None,
+        history_has_parts=bool(run and run.parts and not request.energy),
         notes=(*(judge.notes if judge else ()), *unused_settings),
         fail_on=Severity(fail_on),
         command=command,

@@ -194,6 +194,13 @@ def suggest(
         times = options.write_times(td=td, td_window=td_window)
         output.answer(answer, question=question.repeated._replace(times=times))
         decision = answer.decision
+        if (
+            output.output_format == "value"
+            and decision
+            and not decision.reaches("fair")
+        ):
+            # The bare value does not contain the verdict.
+            output.notes([f"{decision.verdict} this pair: {decision.reason}"], ())
     # The best pair for a given td is shown even if it is poor; the answer and the card then say so.
     min_quality = request.min_quality or ("poor" if td is not None else "fair")
     _finish_answer(output, question, decision, min_quality)
