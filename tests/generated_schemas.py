@@ -1,7 +1,7 @@
 """JSON schemas of the results, generated from their fields.
 
 Each schema is self-contained, so that a validator needs no other file.  ``python -m tests.generated_schemas`` writes
-them.  Check the difference before you commit it: keys may only be added.
+them.  Check the difference before you commit it: keys may only be added, unless the schema gets a new number.
 """
 
 import json

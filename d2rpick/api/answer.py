@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 from d2rpick.base.errors import give_if_written
@@ -21,24 +21,26 @@ if TYPE_CHECKING:
     from d2rpick.report.formats import DisplayOptions
 
 
-@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Answer:
-    """Base class of all answers; an answer is immutable.
+    """Base class of all answers; an answer is an immutable dataclass.
 
-    Two answers are equal if their content is equal, such as an answer and its copy from another process.
+    Two answers are equal if their contents are equal, for example an answer and its copy from another process.
 
-    ``warnings`` are (``code``, ``message``).  ``command`` is the command line that gives the same answer; weights that
-    come from no file are written as ``<weights in memory>``.
+    ``warnings`` contains (``code``, ``message``) of each warning. ``command`` is the command line that gives the same
+    answer; weights that were not read from a file are written as ``<weights in memory>``.
     """
 
-    # Some answers store the command as a field; others compute it as a property.
+    # Some answers store the command as a field; others compute it as a property. The cautions are a field of all.
     if TYPE_CHECKING:
+
+        @property
+        def cautions(self) -> tuple[Caution, ...]:
+            """All warnings."""
 
         @property
         def command(self) -> tuple[str, ...]:
             """The command line that gives the same answer, beginning with the name of the command."""
 
-    cautions: tuple[Caution, ...]
     kind: ClassVar[str]  # Key of this type of answer in the table of output formats.
     # Names of the attributes that the ``repr`` of the answer shows.
     said: ClassVar[tuple[str, ...]] = ()
@@ -118,7 +120,7 @@ class Paged(Answer):
     ) -> str:
         """Return the page; ``command`` is the command line that repeats it.
 
-        With the options ``judging``, the command ``card`` gives the same verdicts.
+        ``judging`` contains the options with which the command ``card`` gives the same verdicts.
         """
         from d2rpick.report import pages
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final, TypedDict
+from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.api.request import OPTIONS
 from d2rpick.base.errors import ArgumentError
@@ -20,6 +20,7 @@ from d2rpick.base.options import (
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from typing import TypedDict
 
     from d2rpick.api.arguments import Parts, Time
     from d2rpick.api.asked import RunQuestion
@@ -33,28 +34,28 @@ _MOST_IDS: Final = 100_000
 _IDS: Final = range(1, UNLIMITED)
 
 
-class CardOptions(TypedDict, total=False):
-    """Options of a card.
-
-    ``solver``: ``"ls-dyna"``, ``"radioss"`` or ``"radioss-sensors"`` (default: the solver that wrote the history); with
-    the id of a ``contact`` or ``wall``, ``"ls-dyna-contact"`` or ``"radioss-contact"``.  ``step_cap``: the largest time
-    step while rigid.  LS-DYNA: ``merge``, the lead part into which all others are merged, ``swset``, the ids of the two
-    switch sets of the first window.  Radioss: ``node``, main nodes of the rigid bodies, ``end`` of the run and its
-    ``name``.
-    """
-
-    solver: str | None
-    merge: int | None
-    swset: tuple[int, int] | None
-    step_cap: float | None
-    node: Parts | None
-    end: Time | None
-    name: str | None
-    contact: int | None
-    wall: int | None
-
-
 if TYPE_CHECKING:
+
+    class CardOptions(TypedDict, total=False):
+        """Options of a card.
+
+        ``solver`` is ``"ls-dyna"``, ``"radioss"`` or ``"radioss-sensors"``; the default is the solver that wrote the
+        history. With the id of a ``contact`` or ``wall``, it may also be ``"ls-dyna-contact"`` or
+        ``"radioss-contact"``. ``step_cap`` is the largest time step while the parts are rigid. For LS-DYNA, ``merge``
+        is the lead part into which all others are merged, and ``swset`` contains the ids of the two switch sets of the
+        first window. For Radioss, ``node`` contains the main nodes of the rigid bodies; ``end`` and ``name`` are those
+        of the run.
+        """
+
+        solver: str | None
+        merge: int | None
+        swset: tuple[int, int] | None
+        step_cap: float | None
+        node: Parts | None
+        end: Time | None
+        name: str | None
+        contact: int | None
+        wall: int | None
 
     class Judging(CardOptions, JudgingOptions, total=False):
         """Options of a card, together with the options that determine how its windows are judged."""
@@ -189,14 +190,14 @@ class Cards:
     def complete(self, question: RunQuestion) -> tuple[Printing, tuple[str, ...]]:
         """Complete the options of a card with values from the deck of the run.
 
-        Notes say which rigid bodies the deck lacks.
+        Notes list the rigid bodies that are missing in the deck.
 
         Raises
         ------
         DeckError
-            If the deck cannot be read, or rigid bodies of it cannot switch the parts.
+            If the deck cannot be read, or if its rigid bodies cannot switch the parts.
         ArgumentError
-            If an option has no place in the input of the solver.
+            If an option does not apply to the input of the solver.
         """
         from d2rpick.deck.printing import find_solver
 
@@ -212,10 +213,10 @@ class Cards:
     ) -> tuple[Printing, tuple[str, ...]]:
         """Return what the deck of the run requires of a card, with notes on rigid bodies that the deck lacks.
 
-        ``parts_on_card`` are the parts to switch if the history has no parts.
+        ``parts_on_card`` contains the parts to be switched if the history has no parts.
 
-        The deck gives the solver, the name and end of the run, ids that are free, the constraints that have to be
-        deleted, and the rigid bodies that switch the parts.
+        The deck defines the solver, the name and end of the run, free ids, the constraints that have to be deleted, and
+        the rigid bodies that switch the parts.
         """
         from d2rpick.deck.printed_card import Printing
 

@@ -20,9 +20,9 @@ if TYPE_CHECKING:
     from d2rpick.api.asked import RunQuestion
     from d2rpick.api.cards import Judging
     from d2rpick.api.runs import Run
+    from d2rpick.base.spans import Times
     from d2rpick.choice.answers import PairVerdict
     from d2rpick.choice.pair.decision import Decision
-    from d2rpick.choice.switched.switched_run import Times
     from d2rpick.deck.printed_card import PrintedCard, Printing
 
 _ONLY_JUDGED: Final = "`parts` selects the parts whose energy judges a card for {}; give a `run` with parts"
@@ -31,9 +31,9 @@ _ONLY_JUDGED: Final = "`parts` selects the parts whose energy judges a card for 
 class JudgedCard(NamedTuple):
     """A card with a verdict on each new window for the printed times; ``str`` returns the text of the card.
 
-    ``card`` has ``text``, ``files`` by the names that the solver expects, ``windows`` as printed and ``notes``.
-    ``cautions`` are the findings of `check` with the card in the deck of the run; if there is no deck, they name what
-    is unknown.
+    ``card`` contains the ``text``, the ``files`` keyed by the names that the solver expects, the ``windows`` as
+    printed, and ``notes``. ``cautions`` contains the findings of `check` for the deck of the run with the card; if
+    there is no deck, it lists what could not be checked.
     """
 
     card: PrintedCard
@@ -78,7 +78,7 @@ def judge_and_print(
     Raises
     ------
     ArgumentError
-        If nobody says whom it switches, or an option belongs to another solver.
+        If it is unknown which parts or bodies the card switches, or if an option belongs to another solver.
     """
     from d2rpick.api.card_in_deck import collect_objections
     from d2rpick.choice.answers import verify_run
@@ -147,14 +147,14 @@ def card(
     Parameters
     ----------
     windows : pairs of float
-        tr and td of each [time].
+        tr and td of each window [time].
     run : Run, optional
         The run, opened with `read`; it must not be switched.
     parts : number or several, optional
-        The parts to be switched; with a run that has parts by title too.
+        The parts to be switched; if a run with parts is given, they may also be given by title.
     **options
-        ``solver``, ``merge``, ``swset``, ``step_cap``, ``node``, ``end``, ``name``; with a run also how it is
-        judged, see ``d2rpick.api.choosing.JudgingOptions``.
+        ``solver``, ``merge``, ``swset``, ``step_cap``, ``node``, ``end``, ``name``; with a run, also options that
+        determine how the windows are judged, see ``d2rpick.api.choosing.JudgingOptions``.
 
     Returns
     -------
@@ -163,9 +163,9 @@ def card(
     Raises
     ------
     D2RPickError
-        If windows do not follow each other, or the run has no such parts or energy.
+        If windows overlap or are not in order, or if the run has no such parts or energy.
     TypeError, ValueError
-        If an argument is not of its kind, or nobody says whom the card switches.
+        If an argument has a wrong type or value, or if it is unknown which parts or bodies the card switches.
 
     Examples
     --------

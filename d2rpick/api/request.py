@@ -114,7 +114,7 @@ class ReadingOptions:
 class Request(ChoiceOptions, ReadingOptions):
     """A question about a run, with times in the unit of the history; contradictions raise ArgumentError.
 
-    ``given`` names the options that were given, also those given with their default value.
+    ``given`` contains the names of the options that were given, including those given with their default value.
     """
 
     stiffness: float | None = _make_oscillator_option("Spring stiffness k.")

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 class RunAnswer(Paged):
     """An answer about one run, together with the question and the times on the command line.
 
-    ``run`` is the run that was asked about.
+    ``run`` is the run to which the question refers.
     """
 
     question: RunQuestion = field(repr=False)

@@ -15,10 +15,11 @@ from d2rpick.histories.formats import READERS
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
+    from d2rpick.base.spans import Times
     from d2rpick.choice.answers import PairVerdict
     from d2rpick.choice.pair.situation import Situation
     from d2rpick.choice.question import Reference, Settings
-    from d2rpick.deck.printed_card import PrintedCard, Printing, Times
+    from d2rpick.deck.printed_card import PrintedCard, Printing
     from d2rpick.histories.history import History
 
 

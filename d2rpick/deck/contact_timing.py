@@ -18,9 +18,7 @@ from d2rpick.deck.radioss_sensors import invert_spans, join_spans
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from d2rpick.deck.printed_card import Times
-
-    Spans = tuple[Times, ...]
+    from d2rpick.base.spans import Spans, Times
 
 
 _ROUNDING: Final = 1e-12  # Relative rounding error in a sum of times [-].

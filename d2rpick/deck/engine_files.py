@@ -10,7 +10,8 @@ from d2rpick.deck.radioss_columns import RUN
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from d2rpick.deck.printed_card import Times
+    from d2rpick.base.spans import Times
+
 
 # Smallest number of time steps in a rigid window; it must be large, because parts are released up to one step late.
 # Each window has its own time-step limit, so that adding a window does not change the run before it.

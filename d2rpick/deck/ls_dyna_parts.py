@@ -112,6 +112,17 @@ _ABLE: Final = (
 )
 # A contact or wall without an id has at most this number of lines; more lines may define a second one.
 _MOST_ROWS: Final = 8
+# Flags of a switching card that delete each kind of constraint (vendor keyword data).
+# No source states which flag deletes extra nodes and joints, so both are listed.
+DELETING_FLAGS: Final[Mapping[Kind, tuple[str, ...]]] = {
+    "nodal rigid body": ("NRBF",),
+    "generalized weld": ("NRBF",),
+    "spotweld": ("NCSF",),
+    "rivet": ("NCSF",),
+    "constrained node set": ("NCSF",),
+    "extra nodes": ("NRBF", "NCSF"),
+    "joint": ("NRBF", "NCSF"),
+}
 
 
 class DeckPartSet(NamedTuple):
@@ -559,19 +570,6 @@ _CONSTRAINTS: Final[
     "rivet": ("CONSTRAINED_RIVET", _read_node_pairs),
     "generalized weld": ("CONSTRAINED_GENERALIZED_WELD", _read_constrained_set),
     "constrained node set": ("CONSTRAINED_NODE_SET", _read_constrained_set),
-}
-
-
-# Flags of a switching card that delete each kind of constraint (vendor keyword data).
-# No source states which flag deletes extra nodes and joints, so both are listed.
-DELETING_FLAGS: Final[Mapping[Kind, tuple[str, ...]]] = {
-    "nodal rigid body": ("NRBF",),
-    "generalized weld": ("NRBF",),
-    "spotweld": ("NCSF",),
-    "rivet": ("NCSF",),
-    "constrained node set": ("NCSF",),
-    "extra nodes": ("NRBF", "NCSF"),
-    "joint": ("NRBF", "NCSF"),
 }
 
 

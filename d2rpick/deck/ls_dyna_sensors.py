@@ -25,11 +25,11 @@ from d2rpick.deck.radioss_sensors import invert_spans
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
+    from d2rpick.base.spans import Spans
     from d2rpick.deck.card import Card, Row
     from d2rpick.deck.columns import CardColumn
     from d2rpick.deck.reader import Deck
 
-    Spans = tuple[tuple[float, float], ...]  # Start and end of each time span [time].
     # A function that returns the time spans in which the force of a contact or wall exceeds a value; None if unknown.
     Forces = Callable[[str, int, float], Spans | None]
 

@@ -14,8 +14,8 @@ from d2rpick.base.errors import DeckError, make_printable
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
-Times = tuple[float, float]
-"""A rigid window (tr, td) [time of the model]."""
+    from d2rpick.base.spans import Times
+
 
 WIDTH = 10  # Width of a field [characters].
 # Largest number of characters of a number; a space separates it from the next field.

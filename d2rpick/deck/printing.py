@@ -45,8 +45,9 @@ from d2rpick.deck.switch_sets import (
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
+    from d2rpick.base.spans import Times
     from d2rpick.deck.contact_timing import Pushes
-    from d2rpick.deck.printed_card import Printing, Times
+    from d2rpick.deck.printed_card import Printing
 
 _FILE: Final = "switches.k"
 
@@ -525,6 +526,18 @@ SOLVERS: Final[Mapping[str, CardSolver]] = {
         _print_radioss_contact,
     ),
 }
+
+
+def names_solver(history_format: str) -> bool:
+    """Return True if a format of a history belongs to a solver; a table may come from any of them.
+
+    Examples
+    --------
+    >>> names_solver("glstat + matsum"), names_solver("csv")
+    (True, False)
+    """
+    formats = set(history_format.split(" + "))
+    return any(formats & {*solver.histories} for solver in SOLVERS.values())
 
 
 def find_solver(history_format: str) -> str:

@@ -48,9 +48,10 @@ from d2rpick.deck.switching import (
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 
+    from d2rpick.base.spans import Spans
     from d2rpick.deck.card import Card
     from d2rpick.deck.radioss_rigid import Body
-    from d2rpick.deck.radioss_sensors import Forces, Spans
+    from d2rpick.deck.radioss_sensors import Forces
 
     Contacts = Callable[[Collection[int]], Spans | None]
 # Number of lines in /BEGIN: the run name, the version, and two lines of units.

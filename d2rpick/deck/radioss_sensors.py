@@ -25,9 +25,9 @@ from d2rpick.deck.radioss_deck import (
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
+    from d2rpick.base.spans import Spans
     from d2rpick.deck.card import Row
 
-    Spans = tuple[tuple[float, float], ...]  # Start and end of each time span [time].
     # A function that returns the time spans in which the force of an interface or rigid wall acts; None if unknown.
     Forces = Callable[[str, int], Spans | None]
 
@@ -209,7 +209,9 @@ def require_forces(path: str, starter: Starter) -> list[tuple[str, int]]:
     forces = list_forces(starter)
     if not forces:
         raise DeckError(
-            f"{path}: the deck has no contact and no rigid wall, so nothing would end a flight"
+            f"{path}: the deck has no contact and no rigid wall, so nothing would end a flight; add the /INTER or "
+            "/RWALL that the parts hit, or compute a reference run without switching and choose the times from it "
+            "(d2rpick plan)"
         )
     return forces
 

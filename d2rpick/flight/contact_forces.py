@@ -145,8 +145,8 @@ def is_deformed(history: History, flight: FreeFlight) -> bool:
     In a flight, the energy oscillates about its level or falls because of damping.
     """
     energy = history.between(flight.start, flight.end)[1]
-    means = np.array(
-        [piece.mean() for piece in np.array_split(energy, _PIECES) if piece.size]
-    )
+    pieces = np.array_split(energy, _PIECES)
+    means = np.array([piece.mean() for piece in pieces if piece.size])
     rise = means - np.minimum.accumulate(means)
-    return float(rise.max(initial=0.0)) > _RISE * float(np.abs(history.energy).max())
+    highest = float(np.abs(history.energy).max())
+    return float(rise.max(initial=0.0)) > _RISE * highest

@@ -82,8 +82,10 @@ class Laws:
         """Prepare the laws of free flight for the parts in columns ``members``; ``balance`` limits an unknown mass."""
         time = momenta.time
         momentum = momenta.of(members)
-        self.fit, self.noise = FreeFall(time, momentum), momenta.noise(members)
-        self.balance, self.velocity = balance, momenta.velocity
+        self.fit = FreeFall(time, momentum)
+        self.noise = momenta.noise(members)
+        self.balance = balance
+        self.velocity = momenta.velocity
         self.gravities = momenta.surroundings.gravity_on(
             momenta.parts and [momenta.parts[i] for i in members]
         )
@@ -236,14 +238,16 @@ class Laws:
 
     def _fades_out(self, window: tuple[int, int], weight: Samples) -> bool:
         """Return True if the force in a window minus the ``weight`` (3,) fades and is small at the end."""
-        third = (window[1] - window[0]) // 3
-        at = [window[0], window[0] + third, window[1] - third, window[1]]
+        start, end = window
+        third = (end - start) // 3
+        at = [start, start + third, end - third, end]
         time = self.fit.time[at]
         # Mean force in each third of the window.
         steps = np.diff(time)[:, np.newaxis]
         force = np.diff(self.fit.momentum[at], axis=0) / steps
         first, _, last = np.linalg.norm(force - weight, axis=1)
-        return bool(last <= _FADED * first and last <= _LITTLE * np.linalg.norm(weight))
+        is_faded = last <= _FADED * first
+        return bool(is_faded and last <= _LITTLE * np.linalg.norm(weight))
 
     def _gravity(self, window: tuple[int, int]) -> float | None:
         """Return the acceleration in a window [length/time^2]: 0 if it is negligible, None if it is not gravity.

@@ -162,8 +162,10 @@ def find_end_of_load(history: History, td: float) -> float | None:
     middle = td - length / 16
     first, first_of_latest = np.searchsorted(history.time, [start, middle])
     after_middle, after_td = np.searchsorted(history.time, [middle, td], side="right")
-    earlier = np.append(history.energy[first:after_middle], history.energy_at(middle))
-    latest = np.append(history.energy[first_of_latest:after_td], history.energy_at(td))
+    earlier = history.energy[first:after_middle]
+    earlier = np.append(earlier, history.energy_at(middle))
+    latest = history.energy[first_of_latest:after_td]
+    latest = np.append(latest, history.energy_at(td))
     if latest.max() > earlier.max() + _BAND_RESERVE * np.ptp(earlier):
         return None
     values = np.append(earlier, latest)
@@ -183,7 +185,8 @@ def _find_last_excursion(history: History, states: slice) -> float | None:
     energy = history.energy[states]
     if energy.size < FEWEST:
         return None
-    low, high = _widen_band(np.quantile(energy, (_OUTER, 1 - _OUTER)), 1.0)
+    usual_range = np.quantile(energy, (_OUTER, 1 - _OUTER))
+    low, high = _widen_band(usual_range, 1.0)
     far = np.flatnonzero((energy < low) | (energy > high))
     return float(history.time[states][far[-1]]) if far.size else None
 
@@ -225,9 +228,11 @@ def _find_change_of_level(history: History, states: slice) -> float | None:
     means = (sums[width:] - sums[:-width]) / width
     # The mean with the index ``count`` is the first mean that contains only later states.
     low, high = _widen_band(means[: count - width + 1], 1.0)
-    outside = np.flatnonzero((means[count:] < low) | (means[count:] > high))
+    later_means = means[count:]
+    outside = np.flatnonzero((later_means < low) | (later_means > high))
     if outside.size:
-        return float(history.time[states.stop + int(outside[0]) + width // 2])
+        middle = states.stop + int(outside[0]) + width // 2
+        return float(history.time[middle])
     return None
 
 

@@ -340,7 +340,8 @@ def _refine_attached_parts(
     free = [i for i in moving if i not in chosen]
     while free:
         sides = np.array([-1.0 if i in members else 1.0 for i in free])
-        sizes = np.linalg.norm(total + sides[:, np.newaxis] * rests[free], axis=1)
+        changes = sides[:, np.newaxis] * rests[free]
+        sizes = np.linalg.norm(total + changes, axis=1)
         best = int(np.argmin(sizes))
         if sizes[best] >= (1 - _ROUNDED) * np.linalg.norm(total):
             break
@@ -529,11 +530,10 @@ def is_complete(
     """
     if whole is None or whole.velocity or whole.time.size != momenta.time.size:
         return np.ones(momenta.time.size, np.bool_)
-    everything = range(momenta.values.shape[1])
-    largest = np.maximum(
-        np.maximum.accumulate(np.abs(whole.values[:, 0]).max(axis=1)), before
-    )
-    difference = np.abs(momenta.of(everything) - whole.values[:, 0]).max(axis=1)
-    return np.asarray(
-        difference <= _ALL_OF_IT * largest + 2 * momenta.noise(everything)
-    )
+    all_parts = range(momenta.values.shape[1])
+    of_model = whole.values[:, 0]
+    so_far = np.maximum.accumulate(np.abs(of_model).max(axis=1))
+    largest = np.maximum(so_far, before)
+    difference = np.abs(momenta.of(all_parts) - of_model).max(axis=1)
+    limit = _ALL_OF_IT * largest + 2 * momenta.noise(all_parts)
+    return np.asarray(difference <= limit)

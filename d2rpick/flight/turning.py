@@ -307,7 +307,8 @@ def _integrate_velocities(
     velocity = momenta.values[:, members] / mass[:, np.newaxis]
     time = momenta.time
     since = integrate_by_trapezia(time, velocity.reshape(time.size, -1))
-    return np.asarray(velocity[0] * time[0] + since.reshape(velocity.shape))
+    before = velocity[0] * time[0]
+    return np.asarray(before + since.reshape(velocity.shape))
 
 
 def _place_by_frames(centre: Samples, since: Samples, frames: Samples) -> Samples:
@@ -374,8 +375,10 @@ def _integrate_matrix(time: Samples, slope: Samples) -> Samples:
     """Return the solution (n, 3, 3) of X' = slope X that starts from the identity matrix."""
     rotations = [np.eye(3)]
     unit = np.eye(3)
-    for step in _take_middle_values(slope) * np.diff(time)[:, np.newaxis, np.newaxis]:
-        rotations.append((unit + step + step @ step / 2) @ rotations[-1])
+    intervals = np.diff(time)[:, np.newaxis, np.newaxis]
+    for step in _take_middle_values(slope) * intervals:
+        increment = unit + step + step @ step / 2
+        rotations.append(increment @ rotations[-1])
     return np.stack(rotations)
 
 
@@ -388,7 +391,8 @@ def _compute_turns(frames: Samples) -> Samples:
     size = np.linalg.norm(sine, axis=1, keepdims=True)
     is_turned = size > 0
     angle = np.arcsin(np.minimum(size, 1.0))
-    angle_over_sine = np.where(is_turned, angle / np.where(is_turned, size, 1.0), 1.0)
+    divisor = np.where(is_turned, size, 1.0)
+    angle_over_sine = np.where(is_turned, angle / divisor, 1.0)
     return np.asarray(sine * angle_over_sine)
 
 
@@ -421,6 +425,7 @@ def _interpolate_at(time: Samples, values: Samples, when: Samples) -> Samples:
     """Return values (n, ...) at times (k,), interpolated linearly."""
     next_state = np.clip(np.searchsorted(time, when), 1, time.size - 1)
     last_state = next_state - 1
-    share = (when - time[last_state]) / (time[next_state] - time[last_state])
+    interval = time[next_state] - time[last_state]
+    share = (when - time[last_state]) / interval
     share = share.reshape(-1, *[1] * (values.ndim - 1))
     return np.asarray(values[last_state] * (1 - share) + values[next_state] * share)

@@ -129,16 +129,8 @@ def open_sources(
         with_nodes = [source for source in sources if _is_node_listing(source)]
     listings = (*with_forces, *with_nodes)
     sources = [source for source in sources if source not in listings]
-    if not sources and with_forces:
-        raise FormatError(
-            f"{with_forces[0].name}: an rcforc or rwforc of LS-DYNA, which has forces and no internal energy; "
-            "name the glstat, matsum or binout of the run with it"
-        )
-    if not sources and with_nodes:
-        raise FormatError(
-            f"{with_nodes[0].name}: this is the nodout of LS-DYNA, which has no internal energy; "
-            "name the glstat, matsum or binout of the run with it"
-        )
+    if not sources:
+        _refuse_only_listings(with_forces, with_nodes)
     kinds, left_out = _sort_by_format(sources, input_format)
     ordered = [kind for kind in READERS if kind in kinds]
     _refuse_time_of_solver(ordered, selection.time)
@@ -180,6 +172,22 @@ def open_sources(
         nodes=tuple(with_nodes),
         reopen=reopen,
     )
+
+
+def _refuse_only_listings(
+    with_forces: Sequence[Source], with_nodes: Sequence[Source]
+) -> None:
+    """Raise FormatError if there are only listings of forces or of the motion of nodes, which contain no energy."""
+    if with_forces:
+        raise FormatError(
+            f"{with_forces[0].name}: an rcforc or rwforc of LS-DYNA, which has forces and no internal energy; "
+            "name the glstat, matsum or binout of the run with it"
+        )
+    if with_nodes:
+        raise FormatError(
+            f"{with_nodes[0].name}: this is the nodout of LS-DYNA, which has no internal energy; "
+            "name the glstat, matsum or binout of the run with it"
+        )
 
 
 def _reopen(

@@ -34,6 +34,8 @@ _NUMBER = r"\d+\.?\d*|\.\d+"
 # A table with this word in its first bytes is probably an energy history.
 _ENERGY_IN_HEAD: Final = b"energy"
 _HEAD_OF_TABLE: Final = 4096
+# Suffixes of decks. A folder with decks but no databases belongs to a run that has not been computed yet.
+_DECKS: Final = (".k", ".key", ".dyn", ".rad")
 
 # Pattern of a file name with or without the number of a restart segment (e.g. runT01, binout0001).
 _NUMBERED: Final = re.compile(r"(.*?)(\d*)(\.gz)?", re.DOTALL)
@@ -206,10 +208,6 @@ def _list_later_files(name: str) -> Sequence[str]:
             numbers[sibling] = number
     in_order = sorted(numbers, key=numbers.__getitem__)
     return [os.path.join(folder, sibling) for sibling in in_order]  # noqa: PTH118  pathlib would slow down start-up
-
-
-# Suffixes of decks. A folder with decks but no databases belongs to a run that has not been computed yet.
-_DECKS: Final = (".k", ".key", ".dyn", ".rad")
 
 
 def _list_databases(folder: Path) -> list[str]:

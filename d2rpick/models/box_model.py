@@ -292,5 +292,6 @@ def compute_stiffest_rate(masses: Values, *trusses: Truss, extra: Values) -> flo
     at_point = extra.copy()
     for truss in trusses:
         np.add.at(at_point, truss.ends, truss.stiffness[:, np.newaxis])
-    rates = at_point / masses
-    return float(np.sqrt(max(rates[truss.ends].sum(axis=1).max() for truss in trusses)))
+    squares_at_points = at_point / masses
+    squares = [squares_at_points[truss.ends].sum(axis=1).max() for truss in trusses]
+    return float(np.sqrt(max(squares)))

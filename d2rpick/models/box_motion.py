@@ -105,11 +105,8 @@ class Contact:
         self._into_sled = complex(np.exp(1j * np.radians(parameters.tilt)))
         self._crushed = np.zeros(self._toes.size)
         self._sleeps_until = 0.0
-        self._fastest = (
-            FASTEST * parameters.speed
-            + FALL
-            + 2 * np.sqrt(2 * GRAVITY * (parameters.drop or 0.0))
-        )
+        drop_speed = np.sqrt(2 * GRAVITY * (parameters.drop or 0.0))
+        self._fastest = FASTEST * parameters.speed + FALL + 2 * drop_speed
         self.released: float | None = None
         self.landings: list[tuple[float, float]] = []
 
@@ -122,10 +119,9 @@ class Contact:
         if gap > 0:
             self._sleeps_until = time + gap / self._fastest
             return None
-        push = Push(
-            self._sled(time, on_sled, velocities),
-            self._on_all(self._ground(positions, velocities), self._skin),
-        )
+        of_sled = self._sled(time, on_sled, velocities)
+        of_ground = self._on_all(self._ground(positions, velocities), self._skin)
+        push = Push(of_sled, of_ground)
         if push.sled.normal.any() and not self.landings:
             self.released = time
         if push.ground.normal.any():
@@ -184,15 +180,14 @@ class Contact:
 
     def _curb(self, positions: Plane, sliding: Plane) -> Face:
         """Return the forces of the curb along -x [N], with friction along z; the curb acts like an upright floor."""
-        may_touch = (positions.imag < self._p.curb) & (
-            positions.real < self._p.cushion_depth + DEEPEST
-        )
+        is_low = positions.imag < self._p.curb
+        is_near = positions.real < self._p.cushion_depth + DEEPEST
+        may_touch = is_low & is_near
         depth = np.where(may_touch, np.maximum(positions.real, 0.0), 0.0)
         trial = STIFFNESS * np.maximum(depth - self._crushed, 0.0)
         yields = np.minimum(trial, self._p.cushion)
-        self._crushed = np.minimum(
-            self._crushed + (trial - yields) / STIFFNESS, self._p.cushion_depth
-        )
+        crushed = self._crushed + (trial - yields) / STIFFNESS
+        self._crushed = np.minimum(crushed, self._p.cushion_depth)
         normal = STIFFNESS * np.maximum(depth - self._crushed, 0.0)
         face = self._with_friction(normal, sliding.imag)
         return Face(np.asarray(1j * face.normal), np.asarray(1j * face.friction))
@@ -216,7 +211,8 @@ class RigidPoints:
         self.arms = positions - self.centre
         self._inertia = float(masses @ np.abs(self.arms) ** 2)
         self.velocity = complex(masses @ velocities) / self._mass
-        self.spin = float(np.vdot(masses * self.arms, velocities).imag) / self._inertia
+        angular_momentum = float(np.vdot(masses * self.arms, velocities).imag)
+        self.spin = angular_momentum / self._inertia
 
     @property
     def places(self) -> Plane:

@@ -16,12 +16,12 @@ from d2rpick.deck.switching import SwitchEvent, SwitchSet, SwitchWindow
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
+    from d2rpick.base.spans import Spans
     from d2rpick.deck.card import Card
     from d2rpick.deck.reader import Deck
     from d2rpick.deck.switching import SwitchHeader, Unit
     from d2rpick.rules.judgement import HistoryJudge
 
-    Spans = tuple[tuple[float, float], ...]  # Start and end of each time span [time].
 
 # For each CODE: what exerts the force, and True if the set waits until the force begins, False if it ends.
 _CODES: Final = {

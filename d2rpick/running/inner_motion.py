@@ -120,20 +120,26 @@ class _Motion:
 
     def _begin(self, rows: Samples) -> None:
         """Begin to follow a motion that is first detected at the last of its states."""
-        distance = np.abs(rows[:, 1] - rows[-1, 1])
+        time, values = rows[:, 0], rows[:, 1]
+        distance = np.abs(values - values[-1])
         self._extreme = len(rows) - 1
         self._turn = self._extreme - int(np.argmax(distance[::-1]))
-        self._sign = int(np.sign(rows[-1, 1] - rows[self._turn, 1]))
-        now = float(rows[-1, 0])
+        self._sign = int(np.sign(values[-1] - values[self._turn]))
+        now = float(time[-1])
         self._swings.append(_HalfPeriod(self, now, now, now))
 
     def _measure(self, rows: Samples, now: float) -> _HalfPeriod:
         """Measure the half period from the last extremum to the current extreme value, detected at ``now``."""
-        time, distance = rows[:, 0], np.abs(rows[:, 1] - rows[0, 1])
-        low = int(np.flatnonzero(distance <= _INNER * distance[-1])[-1])
-        high = low + int(np.argmax(distance[low:] >= (1 - _INNER) * distance[-1]))
-        half = self._factor * float(time[high] - time[low]) / _INNER_TIME
-        strength = float(distance[-1]) / half
+        time, values = rows[:, 0], rows[:, 1]
+        distance = np.abs(values - values[0])
+        whole = distance[-1]
+        is_low = distance <= _INNER * whole
+        low = int(np.flatnonzero(is_low)[-1])
+        is_high = distance[low:] >= (1 - _INNER) * whole
+        high = low + int(np.argmax(is_high))
+        inner_time = float(time[high] - time[low])
+        half = self._factor * inner_time / _INNER_TIME
+        strength = float(whole) / half
         begin, end = time[[0, -1]].tolist()
         self._swings.append(_HalfPeriod(self, begin, end, now, half, strength))
         return self._swings[-1]

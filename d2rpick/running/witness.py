@@ -252,11 +252,10 @@ class GrowingWitness:
         """Return when the centre of mass is again as high as at ``first`` [time]; None if that is before ``last``."""
         begin, end = self._columns.rows[[first, last]]
         gained = end[2:] - begin[2:]
-        time_to_level = (
-            -2 * (end[0] - begin[0]) * (begin[2:] @ gained) / (gained @ gained)
-        )
-        level = float(begin[0] + time_to_level)
-        return level if level > end[0] else None
+        start, now = begin[0], end[0]
+        time_to_level = -2 * (now - start) * (begin[2:] @ gained) / (gained @ gained)
+        level = float(start + time_to_level)
+        return level if level > now else None
 
 
 def _set_tolerance(

@@ -57,7 +57,8 @@ def find_close_modes(grid: Grid, prediction: Prediction) -> Spectrum | None:
         return None
     fits = [_fit_lines(grid, lines) for lines in _divide_lines(grid, spectrum)]
     close_modes = min(fits, key=lambda fit: fit.error)
-    lost = 2 * grid.time.size * np.log(close_modes.error / spectrum.error)
+    increase = close_modes.error / spectrum.error
+    lost = 2 * grid.time.size * np.log(increase)
     return close_modes if lost <= _AS_WELL else None
 
 
@@ -67,7 +68,8 @@ def _is_static_like_beat(grid: Grid, spectrum: Spectrum) -> bool:
     heights, static = _compute_ends(grid, spectrum)
     scatter = spectrum.error * np.sqrt(2 * lines.poles.size / grid.time.size)
     least = ABOVE_SCATTER * _OF_ENDS * scatter
-    of_heights, of_static = (float(ends[1] - ends[0]) for ends in (heights, static))
+    of_heights = float(heights[1] - heights[0])
+    of_static = float(static[1] - static[0])
     is_seen = min(abs(of_heights), abs(of_static)) > least
     is_changing = abs(of_static) > _LEAST_CHANGE * static.max()
     is_static = static > -least
@@ -109,14 +111,15 @@ def _divide_lines(grid: Grid, spectrum: Spectrum) -> Iterator[Exponentials]:
         half_phases = np.arccos(height / together)
         growth = np.log(together[1] / together[0]) / grid.span
         half = weight * together[0] / (2 * height[0])
-        others = np.arange(lines.poles.size) != line
+        is_other = np.arange(lines.poles.size) != line
+        other_poles, other_weights = lines.poles[is_other], lines.weights[is_other]
         for first_phase in (half_phases[0], -half_phases[0]):
             apart = (half_phases[1] - first_phase) / grid.span
             poles = growth + 1j * (pole.imag + sides * apart)
             weights = half * np.exp(1j * sides * first_phase)
             yield Exponentials(
-                np.concatenate([lines.poles[others], poles]),
-                np.concatenate([lines.weights[others], weights]),
+                np.concatenate([other_poles, poles]),
+                np.concatenate([other_weights, weights]),
                 lines.origin,
             )
 
@@ -145,9 +148,9 @@ def _build_normal_equations(
     """Return the scale of each parameter, shape (4 k,), and with it the normal matrix and the gradient of the fit."""
     lines = spectrum.lines
     averaged = spectrum.average_blocks(grid).lines
-    design = averaged.differentiate(grid.time) + _differentiate_heights(
-        lines, grid.time
-    )
+    of_lines = averaged.differentiate(grid.time)
+    of_mean = _differentiate_heights(lines, grid.time)
+    design = of_lines + of_mean
     scale = np.maximum(np.linalg.norm(design, axis=0), 1e-300)
     design /= scale
     return scale, design.T @ design, design.T @ spectrum.rest
@@ -174,18 +177,12 @@ def _move_lines(grid: Grid, lines: Exponentials, step: Samples) -> Spectrum:
     The growth and the decay of the lines are limited to those of modes, because a longer step could overflow.
     """
     of_weights, of_poles = step.reshape(2, 2, -1)
-    growth = np.clip(
-        lines.poles.real + of_poles[0],
-        -MOST_DECAY / grid.span,
-        MOST_GROWTH / grid.span,
-    )
-    return _fill_mean(
-        grid,
-        lines._replace(
-            weights=lines.weights + of_weights[0] + 1j * of_weights[1],
-            poles=growth + 1j * (lines.poles.imag + of_poles[1]),
-        ),
-    )
+    lowest, highest = -MOST_DECAY / grid.span, MOST_GROWTH / grid.span
+    growth = np.clip(lines.poles.real + of_poles[0], lowest, highest)
+    rate = lines.poles.imag + of_poles[1]
+    weights = lines.weights + of_weights[0] + 1j * of_weights[1]
+    moved = lines._replace(weights=weights, poles=growth + 1j * rate)
+    return _fill_mean(grid, moved)
 
 
 def _fill_mean(grid: Grid, lines: Exponentials) -> Spectrum:

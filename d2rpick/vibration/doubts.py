@@ -146,9 +146,14 @@ def _measure_beyond_bounds(reading: Reading, grid: Grid) -> float:
     even = np.linspace(grid.time[0], grid.time[-1], 2 * _CHECKED - 1)
     tr, td = np.triu_indices(_CHECKED, 1)
     middle = tr + td
-    elastic, level = reading.elastic_energy(even), reading.level(even)
+    elastic = reading.elastic_energy(even)
+    level = reading.level(even)
+    ends = even[::2]
     at_ends = np.maximum(elastic[::2], 0.0)
-    coherence = (reading.earlier(even[::2]) @ reading.later(even[::2]).T).real
-    overlap = (elastic - level / 2)[middle] + coherence[tr, td] / 2
-    beyond = np.maximum(np.abs(overlap) - np.sqrt(at_ends[tr] * at_ends[td]), 0.0)
-    return float(np.sqrt(np.mean((beyond / level[middle]) ** 2)))
+    bound = np.sqrt(at_ends[tr] * at_ends[td])
+    coherence = (reading.earlier(ends) @ reading.later(ends).T).real
+    fluctuation = (elastic - level / 2)[middle]
+    overlap = fluctuation + coherence[tr, td] / 2
+    beyond = np.maximum(np.abs(overlap) - bound, 0.0)
+    relative = beyond / level[middle]
+    return float(np.sqrt(np.mean(relative**2)))

@@ -360,8 +360,10 @@ def compute_covariance(normal: Samples, rest: Samples) -> Samples:
     norm = np.sqrt(normal.diagonal())
     norm[norm < _NO_EFFECT] = 1.0
     scale = norm * norm[:, None]
-    variance = float(rest @ rest) / (rest.size - norm.size)
-    return np.asarray(variance * np.linalg.pinv(normal / scale, hermitian=True) / scale)
+    freedom = rest.size - norm.size
+    variance = float(rest @ rest) / freedom
+    inverse = np.linalg.pinv(normal / scale, hermitian=True)
+    return np.asarray(variance * inverse / scale)
 
 
 def measure_structure(rest: Samples, deviations: float = _DEVIATIONS) -> float:

@@ -460,7 +460,17 @@ def _make_mode(parameters: Samples, origin: float) -> Mode:
 
 def _refuse_without_fit(time: Samples, reason: str) -> Identification:
     """Return the result that refuses a record to which nothing was fitted."""
-    start, end = (float(time[0]), float(time[-1])) if time.size else (np.nan, np.nan)
+    start = end = np.nan
+    if time.size:
+        start, end = float(time[0]), float(time[-1])
     return Identification(
-        None, False, reason, None, np.nan, np.nan, start, end, np.zeros((0, 0))
+        mode=None,
+        describes_record=False,
+        reason=reason,
+        misfit=None,
+        rms=np.nan,
+        structure=np.nan,
+        start=start,
+        end=end,
+        covariance=np.zeros((0, 0)),
     )

@@ -149,15 +149,15 @@ def make_even_grid(time: Samples, energy: Samples) -> Grid:
 
 def _count_turns(time: Samples, values: Samples) -> tuple[float, float]:
     """Return the numbers of cycles that the highest relevant and highest strong frequencies complete in times (n,)."""
-    reach = time - time[0]
-    trend = np.polyval(np.polyfit(reach, values, 2), reach)
-    power = np.abs(np.fft.rfft((values - trend) * np.hanning(time.size))) ** 2
+    since_start = time - time[0]
+    trend = np.polyval(np.polyfit(since_start, values, 2), since_start)
+    tapered = (values - trend) * np.hanning(time.size)
+    power = np.abs(np.fft.rfft(tapered)) ** 2
     # White noise has the same power at all frequencies, so the highest frequencies show the noise level.
     noise = _ABOVE_NOISE * float(compute_median(power[power.size // 2 :]))
     running = np.cumsum(np.maximum(power - noise, 0.0))
-    fastest, strongest = np.searchsorted(
-        running, np.array([_ALL_POWER, _STRONG_POWER]) * running[-1]
-    ).tolist()
+    limits = np.array([_ALL_POWER, _STRONG_POWER]) * running[-1]
+    fastest, strongest = np.searchsorted(running, limits).tolist()
     return fastest, strongest
 
 
@@ -335,11 +335,11 @@ class _SignalSpace:
     def poles(self, order: int) -> Complex:
         """Return the poles of ``order`` exponentials [1/time], from the shift invariance of the subspace (ESPRIT)."""
         leading = self.vectors[:, :order]
-        factors = np.linalg.eigvals(
-            np.linalg.lstsq(leading[:-1], leading[1:], rcond=None)[0]
-        )
+        shift = np.linalg.lstsq(leading[:-1], leading[1:], rcond=None)[0]
+        factors = np.linalg.eigvals(shift)
         is_usable = np.isfinite(factors) & (np.abs(factors) > 1e-6)
-        return np.asarray(np.log(factors[is_usable].astype(np.complex128)) / self.step)
+        usable_factors = factors[is_usable].astype(np.complex128)
+        return np.asarray(np.log(usable_factors) / self.step)
 
 
 def fit_spectrum(
@@ -415,5 +415,6 @@ def _few_of(decays: Samples, span: float) -> Samples:
     rounded = sorted(set(np.round(decays * span, 1).tolist()))
     few = np.array([decay for decay in rounded if abs(decay) > _SAME_DECAY])
     if few.size > _MOST_DECAYS:
-        few = few[np.linspace(0, few.size - 1, _MOST_DECAYS).round().astype(int)]
+        spread = np.linspace(0, few.size - 1, _MOST_DECAYS)
+        few = few[spread.round().astype(int)]
     return few / span

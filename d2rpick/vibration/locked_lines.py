@@ -66,24 +66,23 @@ def find_stretches(
     rate = lines.poles.imag
     phase = _find_phases_in_middle(lines, span)
     strongest = float(size.max(initial=0.0))
+    least = max(NOTABLE * strongest, ABOVE_SCATTER * scatter)
+    least_partner = max(_NOTABLE_PARTNER * strongest, ABOVE_SCATTER * scatter)
     order = np.argsort(-size).tolist()
     stretches: list[StretchLine] = []
     for line in order:
-        if size[line] < max(NOTABLE * strongest, ABOVE_SCATTER * scatter):
+        if size[line] < least:
             continue
         for own_line in order:
-            if own_line == line or size[own_line] < max(
-                _NOTABLE_PARTNER * strongest, ABOVE_SCATTER * scatter
-            ):
+            if own_line == line or size[own_line] < least_partner:
                 continue
-            unsure = 3 * min(scatter / size[own_line] + 2 * scatter / size[line], 0.1)
+            phase_error = scatter / size[own_line] + 2 * scatter / size[line]
+            unsure = 3 * min(phase_error, 0.1)
             apart = abs(rate[own_line] - 2 * rate[line]) * span
             if apart > 2 * np.pi * _SAME_RATE:
                 continue
-            if (
-                abs(_wrap(phase[own_line] - 2 * phase[line], 2 * np.pi))
-                < _SAME_PHASE + unsure
-            ):
+            turned = phase[own_line] - 2 * phase[line]
+            if abs(_wrap(turned, 2 * np.pi)) < _SAME_PHASE + unsure:
                 # In a fit, the error of an angular frequency times the record length is sqrt(12) times that of a phase.
                 is_exact = bool(apart < _EXACT_RATE + np.sqrt(12) * unsure)
                 energy = float(size[line] ** 2 / (8 * size[own_line]))
@@ -113,7 +112,8 @@ def _find_side_lines(
     middle_size = size * np.exp(lines.poles.real * span / 2)
     stretches = []
     for first, second in combinations(np.flatnonzero(size > least_size).tolist(), 2):
-        if abs(np.log(middle_size[first] / middle_size[second])) > _SAME_HEIGHT:
+        height_ratio = middle_size[first] / middle_size[second]
+        if abs(np.log(height_ratio)) > _SAME_HEIGHT:
             continue
         apart = np.abs(rate - rate[first] - rate[second]) * span
         own_line = int(np.argmin(apart))
@@ -232,20 +232,19 @@ def _measure_locked_to(
     """Return the relative height of the harmonics of a line beyond the second, up to the first unlocked one [-]."""
     total = 0.0
     for times in _HARMONICS:
-        line = int(np.argmin(np.abs(rate - times * rate[first])))
-        apart = abs(rate[line] - times * rate[first]) * span > 2 * np.pi * _SAME_RATE
-        if line == first or apart or size[line] < ABOVE_SCATTER * scatter:
+        harmonic_rate = times * rate[first]
+        line = int(np.argmin(np.abs(rate - harmonic_rate)))
+        apart = abs(rate[line] - harmonic_rate) * span
+        is_other_rate = apart > 2 * np.pi * _SAME_RATE
+        if line == first or is_other_rate or size[line] < ABOVE_SCATTER * scatter:
             break
         # Stiffening and softening springs have harmonics of opposite signs.
-        if (
-            abs(_wrap(phase[line] - times * phase[first], np.pi))
-            > _SAME_PHASE_OF_HARMONICS
-        ):
+        turned = _wrap(phase[line] - times * phase[first], np.pi)
+        if abs(turned) > _SAME_PHASE_OF_HARMONICS:
             break
         if times > 2:
-            if (
-                size[line] > size[first]
-            ):  # A harmonic is never stronger than its fundamental line, so these lines are modes.
+            # A harmonic is never stronger than its fundamental line, so these lines are modes.
+            if size[line] > size[first]:
                 return 0.0
             total += float(size[line] / size[first])
     return total

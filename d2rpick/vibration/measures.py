@@ -83,9 +83,7 @@ def measured(
 ) -> Columns:
     """Compute a column for each field of `Measured` from times tr (n,) and one ``td``, or a td for each tr."""
     lock_in = lock_in_error(vibration, tr, td)
-    error, lowest, highest = band(
-        residual(lock_in, kinetic_share(vibration, td)), tr, td
-    )
+    error, lowest, highest = bound_residuals(vibration, lock_in, tr, td, band)
     return {
         "sign_match": sign_match(vibration, tr, td).astype(np.float64),
         "lock_in_error": lock_in,
@@ -94,6 +92,17 @@ def measured(
         "residual_high": highest,
         "timing_tolerance": tolerance,
     }
+
+
+def bound_residuals(
+    vibration: Deformation,
+    lock_in: Samples,
+    tr: Samples,
+    td: Samples | float,
+    band: Band,
+) -> tuple[Samples, Samples, Samples]:
+    """Return the stated residual of each tr (n,) with its lower and upper bound, from its error ``lock_in`` [-]."""
+    return band(residual(lock_in, kinetic_share(vibration, td)), tr, td)
 
 
 def spread(size: int, found: Sequence[tuple[NDArray[np.intp], Columns]]) -> Columns:
@@ -278,8 +287,9 @@ def _leaving(mode: Mode, edges: Samples, wanted: Samples, room: Samples) -> Samp
     outside[0] = False
     first = np.argmax(outside, axis=0)
     column = np.flatnonzero(first > 0)
-    inner = edges[first[column] - 1, column]
-    outer = edges[first[column], column]
+    first_outside = first[column]
+    inner = edges[first_outside - 1, column]
+    outer = edges[first_outside, column]
     # The deformation q leaves the band through its upper limit if ``side`` is 1, through its lower limit if it is -1.
     middle = wanted[column]
     tolerated = room[column]
@@ -299,12 +309,14 @@ def vertices(
     time: Samples, values: Samples, at: NDArray[np.intp]
 ) -> tuple[Samples, Samples]:
     """Return times and values of the vertices of parabolas through the samples ``at`` and their neighbours."""
-    step_before = time[at] - time[at - 1]
-    step_after = time[at + 1] - time[at]
-    fall = (values[at] - values[at - 1]) / step_before
-    rise = (values[at + 1] - values[at]) / step_after
-    bend = (rise - fall) / (step_before + step_after)
-    slope = (fall * step_after + rise * step_before) / (step_before + step_after)
+    before, after = at - 1, at + 1
+    step_before = time[at] - time[before]
+    step_after = time[after] - time[at]
+    both_steps = step_before + step_after
+    slope_before = (values[at] - values[before]) / step_before
+    slope_after = (values[after] - values[at]) / step_after
+    bend = (slope_after - slope_before) / both_steps
+    slope = (slope_before * step_after + slope_after * step_before) / both_steps
     # A sample next to an infinite value, or on a straight line, is its own vertex.
     bent = np.isfinite(bend) & (bend != 0)
     step = np.divide(-slope, 2 * bend, out=np.zeros(at.shape), where=bent)

@@ -373,7 +373,9 @@ class ModalVibration:
         ends = self.time[[0, -1]]
         level = self.reading.level_of_modes(ends)
         static = self.reading.spectrum.mean.at(ends) - level / 2
-        return float((static[0] - static[1]) / max(np.mean(level) / 2, 1e-300))
+        decrease = static[0] - static[1]
+        mean_vibration = max(np.mean(level) / 2, 1e-300)
+        return float(decrease / mean_vibration)
 
     @cached_property
     def _phase_share(self) -> float:
@@ -514,9 +516,11 @@ def _can_decide(internal: ModalVibration, kinetic: ModalVibration) -> bool:
     """
     if internal.fallen > _NO_STATIC:
         return False
-    held = float(np.mean(internal.reading.spectrum.mean.at(internal.time)))
-    needed = float(np.mean(kinetic.reading.level_of_modes(internal.time))) / 2
-    return held > (1 - MOST_NEGATIVE) * needed and internal.doubts.beyond < MOST_BEYOND
+    times = internal.time
+    mean_energy = float(np.mean(internal.reading.spectrum.mean.at(times)))
+    elastic_half = float(np.mean(kinetic.reading.level_of_modes(times))) / 2
+    is_contained = mean_energy > (1 - MOST_NEGATIVE) * elastic_half
+    return is_contained and internal.doubts.beyond < MOST_BEYOND
 
 
 def _predicts_within(
@@ -733,9 +737,13 @@ def _compute_sine(squared: Samples) -> Samples:
 def _count_states(lines: Exponentials, grid: Grid, scatter: float) -> float:
     """Return the number of states per period of the highest-frequency relevant line that exceeds the noise."""
     sizes = np.abs(lines.weights)
-    least = max(NOTABLE * float(sizes.max(initial=0.0)), ABOVE_SCATTER * scatter)
-    fastest = float(lines.poles.imag[sizes > least].max(initial=0.0))
-    return 2 * np.pi / (fastest * grid.spacing) if fastest > 0 else np.inf
+    strongest = float(sizes.max(initial=0.0))
+    least = max(NOTABLE * strongest, ABOVE_SCATTER * scatter)
+    rates = lines.poles.imag[sizes > least]
+    highest_rate = float(rates.max(initial=0.0))
+    if highest_rate > 0:
+        return 2 * np.pi / (highest_rate * grid.spacing)
+    return np.inf
 
 
 def _mask_modes(lines: Exponentials, stretches: tuple[StretchLine, ...]) -> Mask:
@@ -749,7 +757,10 @@ def _close_times(reading: Reading, window: tuple[float, float], fewest: int) -> 
     """Return times in a window [time], so closely spaced that a parabola through three of them locates a minimum."""
     rates = reading.modes.poles.imag
     sizes = np.abs(reading.modes.weights)
-    notable = rates[sizes > NOTABLE * sizes.max(initial=0.0)]
+    strongest = sizes.max(initial=0.0)
+    notable = rates[sizes > NOTABLE * strongest]
+    highest_rate = float(notable.max(initial=0.0))
     start, end = window
-    periods = (end - start) * float(notable.max(initial=0.0)) / (2 * np.pi)
-    return np.linspace(start, end, int(max(fewest, _TIMES_PER_PERIOD * periods)) + 1)
+    periods = (end - start) * highest_rate / (2 * np.pi)
+    intervals = int(max(fewest, _TIMES_PER_PERIOD * periods))
+    return np.linspace(start, end, intervals + 1)

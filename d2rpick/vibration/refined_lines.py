@@ -145,11 +145,14 @@ def _list_missing_poles(
 ) -> list[complex]:
     """Return the poles of the first part's lines that the record's lines do not contain, strongest lines first."""
     lines = of_first_part.lines
-    apart = np.abs(np.subtract.outer(lines.poles.imag, spectrum.lines.poles.imag))
-    is_missing = apart.min(axis=1) * grid.span > 2 * np.pi * _SAME_LINE
+    rates = lines.poles.imag
+    apart = np.abs(np.subtract.outer(rates, spectrum.lines.poles.imag))
+    nearest = apart.min(axis=1) * grid.span
+    is_missing = nearest > 2 * np.pi * _SAME_LINE
     strongest_first = np.argsort(-np.abs(lines.weights))
-    poles = lines.poles[strongest_first][is_missing[strongest_first]]
-    return [complex(pole) for pole in poles]
+    poles = lines.poles[strongest_first]
+    missing_poles = poles[is_missing[strongest_first]]
+    return [complex(pole) for pole in missing_poles]
 
 
 def _add_line(grid: Grid, spectrum: Spectrum, pole: complex) -> Spectrum | None:
@@ -189,7 +192,8 @@ def _compute_gain(spectrum: Spectrum, better: Spectrum) -> float:
     least = max(better.error, 1e-300)
     parameters = _OF_A_LINE * better.lines.poles.size + better.mean.poles.size
     freedom = max(better.rest.size - parameters, 1)
-    return float(2 * freedom * np.log(max(spectrum.error, least) / least))
+    reduction = max(spectrum.error, least) / least
+    return float(2 * freedom * np.log(reduction))
 
 
 class _Candidate(NamedTuple):

@@ -210,19 +210,22 @@ def _is_beat(bottom: Samples, floor: Samples, top: Samples, peak: Samples) -> bo
     Parameters
     ----------
     bottom, floor : array of shape (k,)
-        The minima [time], and the energy there.
+        Times of the minima [time], and the energy at them [energy].
     top, peak : array of shape (m,)
         Times of the maxima between them [time], and the energy at them [energy].
     """
     middle = (bottom[1:] + bottom[:-1]) / 2
     lasting = np.diff(bottom)
-    height = np.interp(middle, top, peak) - np.interp(middle, bottom, floor)
+    upper = np.interp(middle, top, peak)
+    lower = np.interp(middle, bottom, floor)
+    height = upper - lower
     longer = np.diff(lasting) / (lasting[1:] + lasting[:-1])
     higher = np.diff(height) / (height[1:] + height[:-1])
     # The first and the last difference have only one neighbour.
     neighbours = np.stack([longer[:-2], longer[2:]])
     longer, higher = longer[1:-1], higher[1:-1]
-    alternating = (np.abs(longer) > _UNEVEN) & np.all(longer * neighbours < 0, axis=0)
+    is_uneven = np.abs(longer) > _UNEVEN
+    alternating = is_uneven & np.all(longer * neighbours < 0, axis=0)
     opposed = longer * higher < 0
     stretched = np.abs(longer) > _STRETCHED * np.abs(higher)
     beating = alternating & (opposed | stretched)
@@ -260,12 +263,13 @@ def _find_turns(energy: Samples) -> tuple[NDArray[np.intp], int]:
 
 def _extend_lines(time: Samples, x: Samples, y: Samples) -> Samples:
     """Return values on the straight lines between points, extrapolated at both ends from the two nearest points."""
+    start, end = time[0], time[-1]
     first_slope = (y[1] - y[0]) / (x[1] - x[0])
     last_slope = (y[-2] - y[-1]) / (x[-2] - x[-1])
-    first = y[0] + first_slope * (time[0] - x[0])
-    last = y[-1] + last_slope * (time[-1] - x[-1])
-    times = np.array([time[0], *x, time[-1]])
-    values = np.array([first, *y, last])
+    at_start = y[0] + first_slope * (start - x[0])
+    at_end = y[-1] + last_slope * (end - x[-1])
+    times = np.array([start, *x, end])
+    values = np.array([at_start, *y, at_end])
     return np.asarray(np.interp(time, times, values))
 
 

@@ -46,11 +46,11 @@ from d2rpick.vibration.measures import run_time_share
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
+    from d2rpick.base.spans import Times
     from d2rpick.choice.pair.decision import Decision
     from d2rpick.choice.pair.situation import Situation
     from d2rpick.choice.parts.cost import CostModel, Share, Weights
     from d2rpick.choice.question import Settings
-    from d2rpick.choice.switched.switched_run import Times
     from d2rpick.deck.model import Inventory
     from d2rpick.histories.run import OpenedRun
 

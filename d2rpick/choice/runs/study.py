@@ -404,6 +404,34 @@ def _digest_files(row: StudyRow) -> tuple[bytes, ...]:
 
 def _warn_about_runs(rows: Sequence[StudyRow], common: Common) -> Iterator[Caution]:
     """Yield the warnings about single runs, and warnings about repeated, omitted and dissimilar runs."""
+    judged = [row for row in rows if row.judged]
+    yield from _warn_about_unusual_files(rows)
+    if common.keeps_tolerance is False:
+        text = f"tr = {common.tr:g} is admissible in all runs, but no tr is within the timing tolerance of every run"
+        yield Caution(
+            "timing-tolerance",
+            f"{text}: in at least one run the error grows by more than 0.05",
+        )
+    yield from _warn_about_difference(
+        "mixed-units",
+        "the runs have different units of time, but td has only one",
+        [row.time_unit for row in judged],
+    )
+    yield from _warn_about_difference(
+        "mixed-bases",
+        "the basis of the choice differs between the runs",
+        [row.basis for row in judged],
+    )
+    for code in dict.fromkeys(code for row in judged for code in row.warnings):
+        sources = [row.source for row in judged if code in row.warnings]
+        yield Caution(
+            code,
+            f"in {len(sources)} of {format_number_of_runs(len(judged))}: {list_names(sources, most=NAMED)}",
+        )
+
+
+def _warn_about_unusual_files(rows: Sequence[StudyRow]) -> Iterator[Caution]:
+    """Yield warnings about runs that were given twice, could not be judged, or end early."""
     repeated = find_repeated_runs(rows)
     if repeated:
         names = list_names([row.source for group in repeated for row in group], NAMED)
@@ -414,9 +442,8 @@ def _warn_about_runs(rows: Sequence[StudyRow], common: Common) -> Iterator[Cauti
             f"the same content was given more than once ({names}), so the study rests on {different_count} of "
             f"{format_number_of_runs(judged_count)}; give each run once",
         )
-    judged = [row for row in rows if row.judged]
     left_out = [row.source for row in rows if not row.judged]
-    if left_out and judged:
+    if left_out and len(left_out) < len(rows):
         text = (
             f"{len(left_out)} of {format_number_of_runs(len(rows))} could not be judged"
         )
@@ -433,37 +460,18 @@ def _warn_about_runs(rows: Sequence[StudyRow], common: Common) -> Iterator[Cauti
             "cut-runs",
             f"{count} were cut, or end earlier than most: {list_names(cut, most=NAMED)}",
         )
-    if common.keeps_tolerance is False:
-        text = f"tr = {common.tr:g} is admissible in all runs, but no tr is within the timing tolerance of every run"
-        yield Caution(
-            "timing-tolerance",
-            f"{text}: in at least one run the error grows by more than 0.05",
-        )
-    for code, sentence, kinds in (
-        (
-            "mixed-units",
-            "the runs have different units of time, but td has only one",
-            [row.time_unit for row in judged],
-        ),
-        (
-            "mixed-bases",
-            "the basis of the choice differs between the runs",
-            [row.basis for row in judged],
-        ),
-    ):
-        counted = Counter(kind or "not named" for kind in kinds)
-        if len(counted) > 1:
-            counts = [
-                f"{kind} in {format_number_of_runs(n)}"
-                for kind, n in counted.most_common()
-            ]
-            yield Caution(code, f"{sentence}: {', '.join(counts)}")
-    for code in dict.fromkeys(code for row in judged for code in row.warnings):
-        sources = [row.source for row in judged if code in row.warnings]
-        yield Caution(
-            code,
-            f"in {len(sources)} of {format_number_of_runs(len(judged))}: {list_names(sources, most=NAMED)}",
-        )
+
+
+def _warn_about_difference(
+    code: str, sentence: str, kinds: Sequence[str | None]
+) -> Iterator[Caution]:
+    """Yield a warning if the runs have different ``kinds``, e.g. of units, with the number of runs of each kind."""
+    counted = Counter(kind or "not named" for kind in kinds)
+    if len(counted) > 1:
+        counts = [
+            f"{kind} in {format_number_of_runs(n)}" for kind, n in counted.most_common()
+        ]
+        yield Caution(code, f"{sentence}: {', '.join(counts)}")
 
 
 def choose_common_tr(rows: Sequence[StudyRow]) -> Common:

@@ -18,9 +18,9 @@ from d2rpick.flight.window import LAST_DIGIT
 from d2rpick.histories.samples import find_stretches
 
 if TYPE_CHECKING:
+    from d2rpick.base.spans import Times
     from d2rpick.histories.history import History, Samples
 
-Times = tuple[float, float]
 # A part is recognised as rigid after at least this number of states without kinetic energy or of constant energy.
 FEWEST: Final = 12
 # An energy vibrates if it changes by at least this multiple of the limit for a constant energy [-].

@@ -34,12 +34,12 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from d2rpick.base.spans import Times
     from d2rpick.choice.question import Reference
     from d2rpick.flight.flight import Flight
     from d2rpick.histories.history import Samples
     from d2rpick.histories.run import OpenedRun
 
-Times = tuple[float, float]
 # Sources that, unlike the energy alone, determine the start of a flight to within a few states.
 _SHARP: Final = ("momentum", "contact-force", "contact-energy", "energy-balance")
 # Parts are treated as not moving if their momentum is at most this fraction of the model's momentum [-].

@@ -22,7 +22,6 @@ from d2rpick.choice.health import WRONG_ENERGY, refuse_unsound, warn_about_engin
 from d2rpick.choice.parts.margins import find_margin
 from d2rpick.choice.switched.switched_run import (
     DoneWindow,
-    Times,
     find_done_windows,
     prepare_switched_history,
 )
@@ -32,6 +31,7 @@ from d2rpick.flight.internal_energy import round_off
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
+    from d2rpick.base.spans import Times
     from d2rpick.choice.answers import PairSuggestion
     from d2rpick.choice.pair.candidates import Candidate, Pair
     from d2rpick.choice.pair.decision import Decision
