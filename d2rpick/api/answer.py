@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 from d2rpick.base.errors import give_if_written
@@ -21,9 +21,8 @@ if TYPE_CHECKING:
     from d2rpick.report.formats import DisplayOptions
 
 
-@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Answer:
-    """Base class of all answers; an answer is immutable.
+    """Base class of all answers; an answer is an immutable dataclass.
 
     Two answers are equal if their contents are equal, for example an answer and its copy from another process.
 
@@ -31,14 +30,17 @@ class Answer:
     answer; weights that were not read from a file are written as ``<weights in memory>``.
     """
 
-    # Some answers store the command as a field; others compute it as a property.
+    # Some answers store the command as a field; others compute it as a property. The cautions are a field of all.
     if TYPE_CHECKING:
+
+        @property
+        def cautions(self) -> tuple[Caution, ...]:
+            """All warnings."""
 
         @property
         def command(self) -> tuple[str, ...]:
             """The command line that gives the same answer, beginning with the name of the command."""
 
-    cautions: tuple[Caution, ...]
     kind: ClassVar[str]  # Key of this type of answer in the table of output formats.
     # Names of the attributes that the ``repr`` of the answer shows.
     said: ClassVar[tuple[str, ...]] = ()

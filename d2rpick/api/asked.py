@@ -75,6 +75,7 @@ class RunQuestion(NamedTuple):
             question = question._replace(
                 options=("--no-deck", *question.options),
                 judging=(*question.judging, "--no-deck"),
+                unused_deck=self.unused_deck,
             )
         else:
             question = self.request.repeat()

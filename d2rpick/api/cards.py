@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final, TypedDict
+from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.api.request import OPTIONS
 from d2rpick.base.errors import ArgumentError
@@ -20,6 +20,7 @@ from d2rpick.base.options import (
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from typing import TypedDict
 
     from d2rpick.api.arguments import Parts, Time
     from d2rpick.api.asked import RunQuestion
@@ -33,28 +34,28 @@ _MOST_IDS: Final = 100_000
 _IDS: Final = range(1, UNLIMITED)
 
 
-class CardOptions(TypedDict, total=False):
-    """Options of a card.
-
-    ``solver`` is ``"ls-dyna"``, ``"radioss"`` or ``"radioss-sensors"``; the default is the solver that wrote the
-    history. With the id of a ``contact`` or ``wall``, it may also be ``"ls-dyna-contact"`` or ``"radioss-contact"``.
-    ``step_cap`` is the largest time step while the parts are rigid. For LS-DYNA, ``merge`` is the lead part into which
-    all others are merged, and ``swset`` contains the ids of the two switch sets of the first window. For Radioss,
-    ``node`` contains the main nodes of the rigid bodies; ``end`` and ``name`` are those of the run.
-    """
-
-    solver: str | None
-    merge: int | None
-    swset: tuple[int, int] | None
-    step_cap: float | None
-    node: Parts | None
-    end: Time | None
-    name: str | None
-    contact: int | None
-    wall: int | None
-
-
 if TYPE_CHECKING:
+
+    class CardOptions(TypedDict, total=False):
+        """Options of a card.
+
+        ``solver`` is ``"ls-dyna"``, ``"radioss"`` or ``"radioss-sensors"``; the default is the solver that wrote the
+        history. With the id of a ``contact`` or ``wall``, it may also be ``"ls-dyna-contact"`` or
+        ``"radioss-contact"``. ``step_cap`` is the largest time step while the parts are rigid. For LS-DYNA, ``merge``
+        is the lead part into which all others are merged, and ``swset`` contains the ids of the two switch sets of the
+        first window. For Radioss, ``node`` contains the main nodes of the rigid bodies; ``end`` and ``name`` are those
+        of the run.
+        """
+
+        solver: str | None
+        merge: int | None
+        swset: tuple[int, int] | None
+        step_cap: float | None
+        node: Parts | None
+        end: Time | None
+        name: str | None
+        contact: int | None
+        wall: int | None
 
     class Judging(CardOptions, JudgingOptions, total=False):
         """Options of a card, together with the options that determine how its windows are judged."""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final, Unpack
 from d2rpick.api import arguments
 from d2rpick.api.answer import build_frame
 from d2rpick.api.asked import RunQuestion, ask_run, make_request
-from d2rpick.api.cards import CardOptions, Cards
+from d2rpick.api.cards import Cards
 from d2rpick.api.judged_cards import JudgedCard, judge_and_print
 from d2rpick.api.request import check_window
 from d2rpick.api.run_answer import RunAnswer
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from d2rpick.api.arguments import Parts, Time
+    from d2rpick.api.cards import CardOptions
     from d2rpick.api.checking import Findings
     from d2rpick.api.choosing import Choosing
     from d2rpick.api.runs import Run

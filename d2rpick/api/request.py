@@ -81,7 +81,7 @@ class ReadingOptions:
         *("file", "FILE"),
     )
     history: tuple[str, ...] = make_option(
-        "History of the reference run, by which the times are judged: file, folder or glob; repeatable.",
+        "History of the reference run, by which the times are judged: file, folder or pattern; repeatable.",
         *("file", "HISTORY"), many=True,
     )  # fmt: skip
     input_format: str = make_option(

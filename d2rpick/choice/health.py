@@ -378,7 +378,7 @@ def list_flaws(history: History) -> Iterator[Caution]:
     if reason:
         yield Caution("blew-up", reason)
     elif _has_no_energy(history):
-        reason = f"nothing to judge: no internal energy exceeds {highest:.3g}, so nothing deforms"
+        reason = f"nothing to judge: no internal energy exceeds {highest:.3g}, so nothing deforms; give a longer run"
         yield Caution("nothing-to-judge", reason)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import chain
+from math import isfinite
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -119,7 +120,7 @@ class Overview(NamedTuple):
     @property
     def verdict(self) -> str:
         """Verdict on whether switch times can be chosen from this run: "use", "use with care" or "do not use"."""
-        if self.unjudged or not self.flights or self._is_spent:
+        if self.unjudged or not self.flights or self._is_spent or self.is_loaded:
             return DO_NOT_USE
         return USE_WITH_CARE if self._doubts else USE
 
@@ -138,8 +139,20 @@ class Overview(NamedTuple):
                 f"this is a switched run: parts are rigid from {_list_times(self.rigid)}, and no flight follows; "
                 "choose times from the reference run, and compare this one with it (d2rpick verify)"
             )
+        if self.is_loaded:
+            return (
+                "gravity or another load acts in every flight, and the files do not show which, so no pair of times "
+                "can be used"
+            )
         summary = f"{_describe_flights(self.flights)}; {_describe_health(self.health)}"
         return "; ".join(self._doubts) or summary
+
+    @property
+    def is_loaded(self) -> bool:
+        """True if a load of unknown kind acts in every flight, so that ``suggest`` refuses every pair of times."""
+        return bool(self.flights) and not any(
+            isfinite(flight.gravity) for _, flight in self.flights
+        )
 
     @property
     def _is_spent(self) -> bool:
@@ -471,6 +484,7 @@ def _find_flights_to_choose_from(
                 flight.parts,
                 flight.end is not None,
                 flight.damping,
+                flight.gravity if flight.unknown_load else 0.0,
             ),
         )
         for flight in flights

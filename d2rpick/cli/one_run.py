@@ -194,6 +194,13 @@ def suggest(
         times = options.write_times(td=td, td_window=td_window)
         output.answer(answer, question=question.repeated._replace(times=times))
         decision = answer.decision
+        if (
+            output.output_format == "value"
+            and decision
+            and not decision.reaches("fair")
+        ):
+            # The bare value does not contain the verdict.
+            output.notes([f"{decision.verdict} this pair: {decision.reason}"], ())
     # The best pair for a given td is shown even if it is poor; the answer and the card then say so.
     min_quality = request.min_quality or ("poor" if td is not None else "fair")
     _finish_answer(output, question, decision, min_quality)
@@ -289,7 +296,7 @@ def explore(
 )
 @options.make_file_option(
     "--switched",
-    "Compare a finished switched run with the reference: file, folder or glob; repeatable.",
+    "Compare a finished switched run with the reference run: file, folder or pattern; repeatable.",
     many=True,
 )
 @options.make_click_option(
@@ -413,8 +420,8 @@ def parts(tr: float | None, td: float | None, request: Request, output: Output) 
 )  # fmt: skip
 @options.make_file_option(
     "--done",
-    "File with the windows in which HISTORY was switched, a line 'tr td' for each, or a journal.  d2rpick plans "
-    "the later windows; -f value, -f card and --write-deck contain both.",
+    "File with the windows in which HISTORY was switched, a line 'tr td' for each, or the journal of d2rpick drive.  "
+    "d2rpick plans the later windows; -f value, -f card and --write-deck contain both.",
 )
 @options.make_file_option(
     "--before",

@@ -52,7 +52,7 @@ if TYPE_CHECKING:
 )  # fmt: skip
 @options.make_file_option(
     "--resume",
-    "Keep finished runs in FILE, and skip unchanged runs that it contains.",
+    "Write the answers for finished runs to FILE, and reuse them for unchanged runs.",
     kind="output",
 )
 @options.make_click_option("jobs", Option(
@@ -271,8 +271,11 @@ def calibrate(folders: tuple[str, ...], output: Output) -> None:
     d2rpick calibrate -f toml -o site.toml sample_data/flying_box
     """
     from d2rpick.api.costs import calibrate as fit
+    from d2rpick.report.next_step import name_step_after_weights
 
     output = output.beside()
     answer = fit(folders)
     output.notes((), answer.cautions)
     output.answer(answer, question=RepeatedQuestion(files=folders))
+    if output.file and output.output_format == "toml":
+        output.next_step(name_step_after_weights(output.file))

@@ -78,7 +78,7 @@ class NumberType(FloatType):
             if param and param.nargs == _PAIR and not hint:
                 hint = ": two numbers were expected"
             if param and param.metavar == "T" and not hint:
-                hint = ", a time in the unit of the run was expected"
+                hint = ", a time in the unit of the run was expected, such as 0.005"
             self.fail(f"{value!r} is not a number{hint}", param, ctx)
         if not math.isfinite(number):
             self.fail(f"{value!r} is not a finite number", param, ctx)

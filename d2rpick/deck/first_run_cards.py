@@ -234,9 +234,14 @@ def _find_contact(path: str, deck: Deck) -> tuple[int, str]:
     if entities.all_known and len(contacts) == 1:
         return contacts[0].id or contacts[0].number, contacts[0].keyword
     count = len(contacts) if entities.all_known else "unknown"
+    if count == 0:
+        cure = "add one between the parts and what they hit, such as *CONTACT_AUTOMATIC_SURFACE_TO_SURFACE"
+    else:
+        cure = "keep one of them"
     raise DeckError(
         f"{path}: {count} contacts between surfaces, or of nodes with a surface; one was expected: a switch waits for"
-        " one, and single-surface contacts never trigger it"
+        f" one, and single-surface contacts never trigger it; {cure}, or compute a reference run without switching and"
+        " choose the times from it (d2rpick plan)"
     )
 
 

@@ -528,6 +528,18 @@ SOLVERS: Final[Mapping[str, CardSolver]] = {
 }
 
 
+def names_solver(history_format: str) -> bool:
+    """Return True if a format of a history belongs to a solver; a table may come from any of them.
+
+    Examples
+    --------
+    >>> names_solver("glstat + matsum"), names_solver("csv")
+    (True, False)
+    """
+    formats = set(history_format.split(" + "))
+    return any(formats & {*solver.histories} for solver in SOLVERS.values())
+
+
 def find_solver(history_format: str) -> str:
     """Return the solver that wrote a history in this format; several formats are joined by ``+``.
 

@@ -209,7 +209,9 @@ def require_forces(path: str, starter: Starter) -> list[tuple[str, int]]:
     forces = list_forces(starter)
     if not forces:
         raise DeckError(
-            f"{path}: the deck has no contact and no rigid wall, so nothing would end a flight"
+            f"{path}: the deck has no contact and no rigid wall, so nothing would end a flight; add the /INTER or "
+            "/RWALL that the parts hit, or compute a reference run without switching and choose the times from it "
+            "(d2rpick plan)"
         )
     return forces
 

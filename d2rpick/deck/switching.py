@@ -231,7 +231,10 @@ def _read_automatic(card: Card) -> SwitchSet:
     rigid = max(rigid, 0)
     deformable = max(deformable, 0)
     switched = [
-        _read_part_line(card, row, to_rigid=True, ptype=True)
+        # If the counts are wrong, a line may belong to the other list.
+        _read_part_line(
+            card, row, to_rigid=not (problem and _is_back_line(row)), ptype=True
+        )
         for row in lines[:rigid]
         if not row.blank
     ]
@@ -266,6 +269,11 @@ def _is_part_line(row: Row) -> bool:
         row.cell(line["PTYPE"].position).upper() in _PTYPES
         for line in (TO_DEFORMABLE, TO_RIGID)
     )
+
+
+def _is_back_line(row: Row) -> bool:
+    """Return True if a line has its PTYPE in the column of a part that becomes deformable."""
+    return row.cell(TO_DEFORMABLE["PTYPE"].position).upper() in _PTYPES
 
 
 def _count_lines(count: int) -> str:

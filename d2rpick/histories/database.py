@@ -23,7 +23,7 @@ from d2rpick.histories.names import (
     mark_namesakes,
     resolve_name,
 )
-from d2rpick.histories.samples import find_newest_states, find_window
+from d2rpick.histories.samples import STEPS_BACK, find_newest_states, find_window
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -395,7 +395,22 @@ class Legs:
             if states.size and not states.any()
         ]
         valid_times = all_times if keep.all() else all_times[keep]
-        return keep, (*notes, *unused, *_note_holes(valid_times))
+        place = self._name_first_step_back(times)
+        placed = [
+            f"{place}: {note}" if note.startswith(STEPS_BACK) else note
+            for note in notes
+        ]
+        return keep, (*placed, *unused, *_note_holes(valid_times))
+
+    def _name_first_step_back(self, times: Sequence[Samples]) -> str:
+        """Return the file and the number of its first state whose time is before that of the state that precedes it."""
+        last = -np.inf
+        for leg, time in zip(self._legs, times, strict=True):
+            back = np.flatnonzero(np.diff(time, prepend=last) < 0)
+            if back.size:
+                return f"{leg.source}, state {back[0] + 1}"
+            last = time[-1] if time.size else last
+        return ""
 
     def _joined(self, columns: Sequence[Samples], keep: NDArray[np.bool_]) -> Samples:
         """Join the columns of the restart segments, and remove the invalid states."""

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 # A table has a row for each part and time if at least this fraction of its states repeat the previous time [-].
 _REPEATED: Final = 0.49
+# A note on times that step back begins with these words.
+STEPS_BACK: Final = "time steps back"
 # Smallest number of times that are examined, because equal times in fewer rows may be a coincidence.
 FEWEST_TIMES: Final = 3
 # Largest ratio of the output intervals before and after a restart [-]; unsorted tables and curves exceed it.
@@ -138,7 +140,7 @@ def find_newest_states(time: Samples) -> tuple[NDArray[np.bool_], tuple[str, ...
         lost = int(np.count_nonzero(~keep)) - equal
         dropped = "1 older state was" if lost == 1 else f"{lost} older states were"
         notes.append(
-            f"time steps back {steps}, {place} (restart); the newer restart segment is used where they "
+            f"{STEPS_BACK} {steps}, {place} (restart); the newer restart segment is used where they "
             f"overlap, {dropped} dropped"
         )
     return keep, tuple(notes)

@@ -21,7 +21,6 @@ from d2rpick.report.fields import (
     write_csv,
 )
 from d2rpick.report.findings_table import (
-    Checks,
     count_severities,
     describe_windows,
     format_finding,
@@ -38,6 +37,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from d2rpick.choice.pair.decision import Decision
+    from d2rpick.report.findings_table import Checks
     from d2rpick.report.formats import DisplayOptions
     from d2rpick.rules import Checked
     from d2rpick.rules.rule import Rule

@@ -7,47 +7,68 @@ from __future__ import annotations
 
 import os
 from collections import Counter
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import make_printable, name_units
 from d2rpick.base.files import STDIN
 from d2rpick.choice.pair.grades import POOR
+from d2rpick.deck.beside import find_history_beside
 from d2rpick.report import tables
 from d2rpick.rules.base import Severity, group_values
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
+    from typing import Any, ClassVar, Protocol
 
     from d2rpick.base.errors import Caution
     from d2rpick.report.formats import DisplayOptions
     from d2rpick.rules import Checked, CheckedWindow
     from d2rpick.rules.base import Finding, Unreadable
 
+    class Checks(Protocol):
+        """What the output formats show of the findings in several decks."""
+
+        # Mark of a dataclass, of which `dataclasses.replace` makes changed copies.
+        __dataclass_fields__: ClassVar[dict[str, Any]]
+
+        @property
+        def results(self) -> Sequence[Checked]:
+            """Results of the decks that could be read."""
+
+        @property
+        def root(self) -> str:
+            """Folder below which paths are shown relative to it."""
+
+        @property
+        def failed(self) -> Sequence[Unreadable]:
+            """Decks that could not be read."""
+
+        @property
+        def cautions(self) -> Sequence[Caution]:
+            """Warnings about the input."""
+
+        @property
+        def history(self) -> Sequence[str] | None:
+            """Files from which the windows were judged; None if there are none."""
+
+        @property
+        def fail_on(self) -> Severity:
+            """Least severe finding that counts as a failure."""
+
+        @property
+        def history_has_parts(self) -> bool:
+            """True if the windows were judged by the energies of their parts."""
+
 
 # Nouns for the severities error, warning and info.
 _NOUNS: Final = ("error", "warning", "info message")
 # Name of the switched run in a command if the user has to give it.
 _SOME_RUN: Final = "SWITCHED_RUN"
+# Name of the history in a command if the user has to give it.
+_SOME_HISTORY: Final = "HISTORY"
 # Rule that reports switches without a time, and the end of its message if nothing else gives their time.
 _UNTIMED_RULE: Final = "D2R302"
 _NOT_JUDGED: Final = "not judged by time"
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Checks:
-    """The findings in several decks; paths below ``root`` are shown relative to it.
-
-    ``failed`` lists the decks that could not be read.  ``history`` lists the files from which the windows were judged;
-    None if there is none.  Findings less severe than ``fail_on`` are not failures.
-    """
-
-    results: Sequence[Checked]
-    root: str = field(default_factory=os.getcwd)
-    failed: Sequence[Unreadable] = ()
-    cautions: Sequence[Caution] = ()
-    history: Sequence[str] | None = None
-    fail_on: Severity = Severity.ERROR
 
 
 def as_table(checks: Checks, display: DisplayOptions) -> str:
@@ -102,7 +123,9 @@ def _name_next_step(checks: Checks) -> str:
     if serious:
         worst = min(serious, key=lambda finding: finding.severity.rank)
         explain = tables.quote_shell_line(("d2rpick", "rule", worst.rule))
-        return f"correct the deck where a line above says so; {explain} explains the worst of them"
+        return (
+            f"correct what the lines above report; {explain} explains the worst of them"
+        )
     decks = tables.make_positional([result.deck for result in checks.results])
     itself = next(filter(_switches_at_unknown_times, checks.results), None)
     if itself:
@@ -112,13 +135,17 @@ def _name_next_step(checks: Checks) -> str:
             f"run the deck; {follow} shows meanwhile when the parts fly and are rigid"
         )
     if not any(result.cards for result in checks.results):
-        return "if the run is to be switched, choose the times with d2rpick plan HISTORY, and add the cards to the deck"
+        found, hint = _name_history(checks)
+        plan = tables.quote_shell_line(("d2rpick", "plan", *found))
+        return f"if the run is to be switched, choose the times with {plan}{hint}, and add the cards to the deck"
     if all(map(_has_only_untimed_cards, checks.results)):
         explain = tables.quote_shell_line(("d2rpick", "rule", _UNTIMED_RULE))
         return f"no card has a time that a history can judge; {explain} says how to have such switches judged"
     if checks.history is None:
+        # The history next to a deck that switches may be that of the switched run.
         command = tables.quote_shell_line(("d2rpick", "check", *decks))
-        return f"judge the times by the reference run: {command} --history HISTORY"
+        hint = f"(history of the reference run instead of {_SOME_HISTORY})"
+        return f"judge the times by the reference run: {command} --history {_SOME_HISTORY} {hint}"
     history = tables.make_positional(checks.history)
     grades = [
         window.decision.grade
@@ -134,10 +161,35 @@ def _name_next_step(checks: Checks) -> str:
     # The switched run is expected in the folder of the deck, unless this folder already contains the reference run.
     runs = [] if folders & of_history else [folder or os.curdir for folder in folders]
     switched = tables.make_positional(runs[:1] or [_SOME_RUN])
+    hint = "" if runs else f" (folder of the switched run instead of {_SOME_RUN})"
+    parts = _name_judged_parts(checks)
     line = tables.quote_shell_line(
-        ("d2rpick", "verify", "--switched", *switched, *history)
+        ("d2rpick", "verify", "--switched", *switched, *parts, *history)
     )
-    return f"run the deck, and compare the run with {line}"
+    return f"run the deck, and compare the run with {line}{hint}"
+
+
+def _name_history(checks: Checks) -> tuple[tuple[str, ...], str]:
+    """Return the history next to the only deck or, if there is none, a placeholder, and a hint to replace it."""
+    decks = [result.deck for result in checks.results]
+    history = find_history_beside(decks[0]) if len(decks) == 1 else None
+    if history:
+        return tables.make_positional([history]), ""
+    hint = f" (history of the reference run instead of {_SOME_HISTORY})"
+    return (_SOME_HISTORY,), hint
+
+
+def _name_judged_parts(checks: Checks) -> tuple[str, ...]:
+    """Return the option that names the parts of the judged windows; empty if the whole model was judged."""
+    parts = {
+        window.part
+        for result in checks.results
+        for window in result.windows
+        if window.decision and window.part is not None
+    }
+    if not checks.history_has_parts or not parts:
+        return ()
+    return ("--part", ",".join(map(str, sorted(parts))))
 
 
 def _format_windows(windows: Sequence[CheckedWindow], root: str) -> Iterator[str]:

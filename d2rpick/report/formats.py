@@ -66,6 +66,8 @@ class RepeatedQuestion(NamedTuple):
         Files of the history.
     card : tuple of str
         Options of the card, which only a command that prints a card accepts.
+    unused_deck : str
+        Main deck that the user named but that belongs to another model; empty if there is none.
     """
 
     times: tuple[str, ...] = ()
@@ -75,6 +77,7 @@ class RepeatedQuestion(NamedTuple):
     checking: tuple[str, ...] = ()
     files: tuple[str, ...] = ()
     card: tuple[str, ...] = ()
+    unused_deck: str = ""
 
 
 class DisplayOptions(NamedTuple):

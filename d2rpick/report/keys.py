@@ -405,7 +405,7 @@ _MODE: Final = row(
     Field("alpha", "number", "rate at which the energy of the mode decays [1/time]"),
     Field("vibration_energy_td", "number", "vibration energy of the mode at td"),
 )
-# JSON fields of a situation at td.
+# JSON fields that describe the vibration and the flight at td.
 MECHANICS: Final = row(
     Field("energy_td", "number", "internal energy at td"),
     Field("kinetic_share", maybe(SHARE), "kinetic fraction K: fraction of the vibration energy that is kinetic at td"),

@@ -102,6 +102,11 @@ _RECORD: Final = {
 }
 # Advice if momenta are written but show no flight.
 _GIVE_END_OF_LOAD: Final = "if you know that the parts fly after a load, give its end to d2rpick plan with --after"
+# Advice if a load of unknown kind acts in every flight.
+_EXPLAIN_LOAD: Final = (
+    "write the mass and the part momenta (LS-DYNA matsum, Radioss /TH/PART), or give the deck of the run as `deck`, "
+    "because it defines gravity and loads"
+)
 # Statement that no file names the unit of time.
 _UNNAMED: Final = "not named by the files: all values are in the units of the run"
 # Keys of the JSON output whose value is neither a list nor an object.
@@ -147,6 +152,8 @@ def list_overview_lines(overview: Overview) -> list[tuple[str, str]]:
         is_known = overview.unjudged or overview.rigid
         if is_known:
             return lines
+        if overview.is_loaded:
+            return [*lines, ("to improve", _EXPLAIN_LOAD)]
         missing = overview.should_write
         cure = f"write {missing}" if missing else _GIVE_END_OF_LOAD
         return [*lines, ("to improve", cure)]

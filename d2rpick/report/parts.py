@@ -21,7 +21,7 @@ from d2rpick.report.fields import (
     write_csv,
 )
 from d2rpick.report.formats import RepeatedQuestion
-from d2rpick.report.next_step import write_command
+from d2rpick.report.next_step import name_deck_of_run, write_command
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -30,8 +30,6 @@ if TYPE_CHECKING:
     from d2rpick.choice.parts.switchable_parts import PartRow
     from d2rpick.report.formats import DisplayOptions
 
-# Name of a deck in a command if the user has to give it.
-_SOME_DECK: Final = "DECK"
 # Column names of the table of sets, and of the two tables between which the columns for parts are divided.
 SETS = (
     "set",
@@ -499,8 +497,9 @@ def _name_step_without_set(answer: Parts, question: RepeatedQuestion) -> str:
     # The options name a deck that was not used.
     of_files = RepeatedQuestion(files=question.files)
     if answer.inventory is None:
-        line = write_command(of_files, "parts", "--deck", _SOME_DECK)
-        return f"judge the parts with {line} (main deck of this run instead of {_SOME_DECK})"
+        deck = name_deck_of_run(question)
+        line = write_command(of_files, "parts", "--deck", deck.name)
+        return f"judge the parts with {line}{deck.hint}"
     if not any(row.flight and row.flight.flies is not None for row in answer.rows):
         line = write_command(question, "plan", new_parts=["all"])
         return f"if all parts fly together, plan their switching with {line}"

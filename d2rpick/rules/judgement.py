@@ -303,7 +303,7 @@ def find_faults(verdict: PairVerdict) -> Iterator[Fault]:
         # One mistake should cause only one finding.
         and not any(fault.at_td for fault in limit_faults)
     ):
-        better = find_better_pair(situation)
+        better = decision.better or find_better_pair(situation)
         cure = _name_pair(better) if better else "no better td was found"
         problem = f"{situation.kinetic_share:.0%} of the vibration energy is kinetic at td = {situation.td:.6g}"
         yield Fault("D2R203", True, f"{problem} and is lost for every tr; {cure}")
@@ -396,6 +396,10 @@ def _suggest_cure(verdict: PairVerdict) -> str:
     If most of the vibration energy is lost at td, no tr is suitable, and this cure names the same pair as D2R203.
     """
     situation = verdict.situation
+    better = verdict.decision.better
+    if better and better.td != situation.td:
+        # The verdict names this pair as well.
+        return _name_pair(better)
     if _loses_most(situation):
         better = find_better_pair(situation)
         if better:

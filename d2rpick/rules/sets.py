@@ -6,7 +6,6 @@ from functools import partial
 from typing import TYPE_CHECKING, Final, Literal
 
 from d2rpick.base.errors import list_names
-from d2rpick.deck.force_switching import find_delay_without_chatter
 from d2rpick.deck.ls_dyna_columns import SENSOR_CONTROL
 from d2rpick.deck.ls_dyna_parts import Entities, read_entities
 from d2rpick.deck.switching import BY_SENSOR, BY_TIME, SwitchHeader, SwitchSet, Unit
@@ -495,6 +494,9 @@ def _check_chatter(case: Case) -> Iterator[Objection]:
     for switch in case.by_condition:
         short_count = len(switch.times) - len(switch.lasting)
         if short_count:
+            # Imported here to keep start-up fast.
+            from d2rpick.deck.force_switching import find_delay_without_chatter
+
             wait = switch.contacts and find_delay_without_chatter(
                 switch.lasting, switch.contacts
             )

@@ -361,8 +361,8 @@ def _check_unturned_stresses(case: Case) -> Iterator[Objection]:
     """While a part is rigid, the solver does not compute its elements. Formulations without a co-rotational frame keep
     their stresses in global axes, so after a rotation they spring back in the wrong direction. Parts that are rigid
     from the start have no stress, so d2rpick does not report them. Source for Radioss: Altair's help (bricks with
-    Isolid 1 or 2 without Iframe 2, tetrahedra, 16-node thick shells, 20-node bricks; not HEPH or HA8). For LS-DYNA it
-    follows from the theory of the formulations; sources disagree on what LS-DYNA does with the stresses.
+    Isolid 1 or 2 without Iframe 2, tetrahedra, 16-node thick shells, 20-node bricks; not HEPH or HA8). For LS-DYNA
+    the rule follows from the theory of the formulations; sources disagree on what LS-DYNA does with the stresses.
 
     Fix: Use a co-rotational formulation for these solids, or keep them deformable. If the part rotates little between
     tr and td, the error is small.
@@ -451,8 +451,8 @@ def _check_flowing_material(case: Case) -> Iterator[Objection]:
 def _check_reference_laws(case: Case) -> Iterator[Objection]:
     """Hyperelastic and total Lagrangian laws compute the stress from the deformation since the start, not from the
     stress at the time at which the part was made rigid. After the switch back the part may have a stress that it did
-    not have before. For Radioss: hyperelastic laws, and solids with Ismstr 10 to 12. Source: the theory of the laws,
-    and a report of 2026 on a hyperelastic solid in LS-DYNA R14. Not tested with the solver.
+    not have before. In Radioss, the rule applies to hyperelastic laws and to solids with Ismstr 10 to 12. Source: the
+    theory of the laws, and a report of 2026 on a hyperelastic solid in LS-DYNA R14. Not tested with the solver.
 
     Fix: Keep the part deformable, or compare its stress after td with the reference run.
     """

@@ -134,7 +134,7 @@ def _is_lost(window: SwitchWindow) -> bool:
 def _check_times_in_order(case: Case) -> Iterator[Objection]:
     """The R2D switch of a part must come after its D2R switch. The solver does not sort the switches by time.
 
-    Fix: Make td later than tr. The two times may be swapped.
+    Fix: Make td later than tr. Perhaps the two times were exchanged.
     """
     for (opening, closing), windows in _group_closed_windows(case).items():
         first = windows[0]
@@ -458,7 +458,7 @@ def _check_locked_in_error(case: Case) -> Iterator[Objection]:
     share a window together, as d2rpick verify does, or the whole model if the history has no parts. It uses the
     frozen-deformation error if a vibration model describes the history, otherwise the level error.
 
-    Fix: Replace tr, or both times, by the times in the finding, or by those of d2rpick suggest.
+    Fix: Replace tr, or both times, by the times in the finding, or by the times that d2rpick suggest gives.
     """
     return _report_faults(case, "D2R201")
 
@@ -511,7 +511,7 @@ def _check_quality(case: Case) -> Iterator[Objection]:
     not show that they will be right. d2rpick judges the pair in the same way as d2rpick verify. With --min-quality
     good, it also reports fair pairs; with --min-quality poor, it reports no pair.
 
-    Fix: Use the pair that the finding names. If it names none, do what it says would improve the pair.
+    Fix: Use the pair that the finding names. If it names none, follow its advice.
     """
     return _report_faults(case, "D2R209")
 

@@ -83,9 +83,7 @@ def measured(
 ) -> Columns:
     """Compute a column for each field of `Measured` from times tr (n,) and one ``td``, or a td for each tr."""
     lock_in = lock_in_error(vibration, tr, td)
-    error, lowest, highest = band(
-        residual(lock_in, kinetic_share(vibration, td)), tr, td
-    )
+    error, lowest, highest = bound_residuals(vibration, lock_in, tr, td, band)
     return {
         "sign_match": sign_match(vibration, tr, td).astype(np.float64),
         "lock_in_error": lock_in,
@@ -94,6 +92,17 @@ def measured(
         "residual_high": highest,
         "timing_tolerance": tolerance,
     }
+
+
+def bound_residuals(
+    vibration: Deformation,
+    lock_in: Samples,
+    tr: Samples,
+    td: Samples | float,
+    band: Band,
+) -> tuple[Samples, Samples, Samples]:
+    """Return the stated residual of each tr (n,) with its lower and upper bound, from its error ``lock_in`` [-]."""
+    return band(residual(lock_in, kinetic_share(vibration, td)), tr, td)
 
 
 def spread(size: int, found: Sequence[tuple[NDArray[np.intp], Columns]]) -> Columns:

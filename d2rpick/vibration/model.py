@@ -30,7 +30,7 @@ from d2rpick.vibration.moments import (
     SampledEnergy,
     find_moments_of_mode,
 )
-from d2rpick.vibration.oscillator_band import residual_band
+from d2rpick.vibration.oscillator_band import OscillatorBand
 from d2rpick.vibration.span import SMALLEST
 
 if TYPE_CHECKING:
@@ -247,6 +247,19 @@ class Vibration:
         if self.compared is None:
             return np.zeros(times.shape, dtype=bool)
         return (times >= self.compared.first) & (times <= self.compared.last)
+
+    def compute_residuals(self, tr: Samples) -> Samples:
+        """Return the stated residual of each tr (n,); NaN where the deformation cannot be compared with that at td."""
+        residuals = np.full(tr.shape, np.nan)
+        is_comparable = self.comparable(tr)
+        if is_comparable.any():
+            assert self.compared
+            deformation, times = self.compared.deformation, tr[is_comparable]
+            lock_in = measures.lock_in_error(deformation, times, self.td)
+            residuals[is_comparable], _, _ = measures.bound_residuals(
+                deformation, lock_in, times, self.td, self.compared.band
+            )
+        return residuals
 
     def measures_of(self, tr: Samples, td: Samples | float) -> Columns:
         """Return the measures of comparable times (n,) as columns; for a single mode, ``td`` may be an array (n,)."""
@@ -483,7 +496,7 @@ def find_energy_at(history: History, td: float, evidence: Evidence) -> Vibration
         whole.mode,
         *whole.span,
         None,
-        partial(residual_band, fit),
+        OscillatorBand(fit, td).bound_residual,
     )
     return Vibration(
         "oscillator", whole, compared, undescribed="not described by the oscillator"

@@ -646,6 +646,23 @@ def test_a_part_that_is_rigid_in_the_whole_run_is_not_judged_by_time(
     assert "--history" not in run("check", deck).stdout.split("next")[1].split("\n0")[0]
 
 
+def test_a_line_of_the_other_list_is_no_second_mistake_of_wrong_counts() -> None:
+    """The counts say two D2R lines and one R2D line; the second line has the PTYPE of an R2D line."""
+    card = write_automatic_card(1, "0.02", rigid=["1"])
+    back = write_automatic_card(2, "0.09", deformable=["1"])
+    wrong = back.replace("0.0         0         1", "0.0         2         1")
+    deck = place("main.k", HEAD + PARTS + card + wrong + END)
+    assert list_rules(run_json("check", deck, "--select", "D2R0,D2R1")) == ["D2R001"]
+
+
+def test_the_step_after_a_good_check_names_the_judged_parts() -> None:
+    cards = write_automatic_card(1, "0.123689", rigid=["1", "2"])
+    back = write_automatic_card(2, "0.37", deformable=["1", "2"])
+    deck = place("run/main.k", cards + back)
+    text = run("check", deck, "--history", MATSUM, "--select", "D2R2").stdout
+    assert f"verify --switched run --part 1,2 {MATSUM}" in " ".join(text.split())
+
+
 def test_a_part_that_is_rigid_from_the_start_is_judged_by_its_td() -> None:
     back = write_automatic_card(2, "0.0687534", deformable=["1"])
     cards = "*DEFORMABLE_TO_RIGID\n         1\n" + back

@@ -17,6 +17,7 @@ from tests.command import (
     ROLLOVER,
     ROOT,
     join_wrapped_lines,
+    put,
     run,
     run_json,
 )
@@ -228,7 +229,9 @@ def test_the_next_command_can_be_typed_as_it_stands(
 def test_the_shortest_way_to_a_card_of_connected_parts_merges_them(
     arguments: tuple[str, ...], tmp_path: Path
 ) -> None:
-    text = find_line("next", *arguments)
+    copy = put(tmp_path / "matsum", Path(MATSUM).read_bytes())
+    of_copy = (str(copy) if word == MATSUM else word for word in arguments)
+    text = find_line("next", *of_copy)
     assert "without it, parts that share nodes become separate rigid bodies" in text
     match = re.search(r"d2rpick (.*?) \(", text)
     assert match, text
@@ -239,6 +242,24 @@ def test_the_shortest_way_to_a_card_of_connected_parts_merges_them(
     card = "".join([step.stdout, *written])
     assert "         2         1      PART\n" in card
     assert "CHECK BEFORE USE" not in card
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [("plan", *FLYING), ("suggest", *FLYING), ("verify", *WITH_CARE, MATSUM)],
+    ids=" ".join,
+)
+def test_the_deck_next_to_a_history_is_named_in_the_next_command(
+    arguments: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    text = find_line("next", *arguments)
+    assert f"--deck {DECK}" in text
+    match = re.search(r"d2rpick (.*?)(?:\. Then|$)", text)
+    assert match, text
+    step = run(*shlex.split(match[1]))
+    written = [path.read_text() for path in Path("switched").glob("*.k")]
+    assert "         2         1      PART\n" in "".join([step.stdout, *written])
 
 
 def test_a_card_whose_parts_may_share_nodes_says_so_in_its_text() -> None:
@@ -465,9 +486,14 @@ def test_a_tr_during_the_load_is_named_as_the_only_reason() -> None:
 
 
 @pytest.mark.parametrize("deck", [(), ("--deck", str(SAMPLES / "switching.k"))])
-def test_parts_without_its_deck_asks_for_the_deck(deck: tuple[str, ...]) -> None:
+def test_parts_without_its_deck_asks_for_the_deck(
+    deck: tuple[str, ...], tmp_path: Path
+) -> None:
     step = find_line("next", "parts", *deck, MATSUM)
-    assert f"d2rpick parts --deck DECK {MATSUM}" in step
+    assert step.endswith(f"d2rpick parts --deck {DECK} {MATSUM}")
+    copy = str(put(tmp_path / "matsum", Path(MATSUM).read_bytes()))
+    step = find_line("next", "parts", *deck, copy)
+    assert f"d2rpick parts --deck DECK {copy}" in step
     assert "switching.k" not in step
 
 
@@ -594,6 +620,37 @@ def test_a_flight_that_is_too_short_has_no_other_verdict() -> None:
     assert "with --min-rigid 0.3 (another value may allow one)" in find_line(
         "next", *question
     )
+
+
+# Commands that follow each other do not contradict each other.
+
+
+@pytest.mark.parametrize("history", [EXCEL, "loaded"])
+def test_info_does_not_offer_a_run_that_suggest_refuses(
+    history: str, request: pytest.FixtureRequest
+) -> None:
+    name = history if history == EXCEL else request.getfixturevalue(history)
+    assert run_json("suggest", name)["verdict"] == "do not use"
+    overview = run_json("info", name)
+    assert overview["verdict"] == "do not use"
+    assert "gravity or another load" in overview["verdict_reason"]
+    assert "write the mass" in find_line("to improve", "info", name)
+
+
+@pytest.mark.parametrize(("tr", "td"), [("0.02", "0.2"), ("0.05", "0.36")])
+def test_the_findings_of_check_name_the_pair_of_the_verdict(
+    tr: str, td: str, tmp_path: Path
+) -> None:
+    card = run("card", "--tr", tr, "--td", td, "--part", "1,2").stdout
+    deck = put(tmp_path / "main.k", card)
+    question = ("check", str(deck), "--history", MATSUM, "--select", "D2R2")
+    report = run_json(*question)
+    cures = {window["cure"] for window in report["windows"]}
+    (pair,) = {tuple(re.findall(r"t[rd] = ([0-9.]+)", cure)) for cure in cures}
+    assert report["findings"]
+    for finding in report["findings"]:
+        named = re.search(r"use td = ([0-9.]+) with tr = ([0-9.]+)", finding["message"])
+        assert named is None or (named[2], named[1]) == pair
 
 
 # The page of an answer gives its next step.

@@ -8,8 +8,8 @@ from xml.etree import ElementTree as ET
 import pytest
 from hypothesis import given, strategies as st
 
+from d2rpick.api.checking import Findings
 from d2rpick.report import formats, rule_texts
-from d2rpick.report.findings_table import Checks
 from d2rpick.rules import RULES, Checked, check_deck
 from d2rpick.rules.base import Finding, Severity
 from d2rpick.rules.rule import END, GOOD, HEAD, PARTS, write_automatic_card
@@ -43,7 +43,7 @@ def write_findings(
     return formats.write(
         "findings",
         form,
-        Checks(results, str(root), fail_on=fail_on),
+        Findings(results=results, root=str(root), fail_on=fail_on),
         formats.DisplayOptions(),
     )
 

@@ -10,7 +10,6 @@ from d2rpick.choice.pair.candidates import Candidate, Candidates, judge_times
 from d2rpick.choice.pair.warnings import find_largest_energy
 from d2rpick.histories.samples import find_crossings, halve_brackets, merge_times
 from d2rpick.vibration.measures import TOLERATED_GROWTH
-from d2rpick.vibration.model import measure_all
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -288,10 +287,13 @@ def _compute_errors(situation: Situation, times: Samples) -> Samples:
     """
     if situation.at_rest or not times.size:
         return np.zeros(times.shape)
-    _, measured = measure_all([situation.vibration], times.ravel(), [0, times.size])
-    compared = np.sqrt(situation.errors(times) ** 2 + (situation.kinetic_share or 0.0))
-    stated = measured["residual"].reshape(times.shape)
-    return np.where(np.isnan(stated), compared, stated)
+    errors = situation.vibration.compute_residuals(times)
+    is_unknown = np.isnan(errors)
+    if is_unknown.any():
+        kinetic_share = situation.kinetic_share or 0.0
+        compared = np.sqrt(situation.errors(times) ** 2 + kinetic_share)
+        errors[is_unknown] = compared[is_unknown]
+    return errors
 
 
 def _is_inside(times: Samples, windows: Samples) -> NDArray[np.bool_]:
