@@ -240,7 +240,7 @@ def _find_contact(path: str, deck: Deck) -> tuple[int, str]:
         cure = "keep one of them"
     raise DeckError(
         f"{path}: {count} contacts between surfaces, or of nodes with a surface; one was expected: a switch waits for"
-        f" one, and single-surface contacts never trigger it; {cure}, or compute a reference run without switching and"
+        f" one, and single-surface contacts never trigger it; {cure}, or compute a reference run and"
         " choose the times from it (d2rpick plan)"
     )
 

@@ -210,7 +210,7 @@ def require_forces(path: str, starter: Starter) -> list[tuple[str, int]]:
     if not forces:
         raise DeckError(
             f"{path}: the deck has no contact and no rigid wall, so nothing would end a flight; add the /INTER or "
-            "/RWALL that the parts hit, or compute a reference run without switching and choose the times from it "
+            "/RWALL that the parts hit, or compute a reference run and choose the times from it "
             "(d2rpick plan)"
         )
     return forces

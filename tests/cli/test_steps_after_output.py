@@ -272,8 +272,10 @@ def test_a_card_of_parts_that_may_share_nodes_says_how_to_merge_them() -> None:
     times = ("--tr", "0.123689", "--td", "0.37", "--part", "1,2")
     apart = run("card", *times, *history).stderr
     merged = run("card", *times, "--merge", "1", *history).stderr
+    # The history has a deck beside it, which shows whether the parts share nodes.
     assert (
-        "next: if these parts share nodes, print the card again with --merge" in apart
+        f"next: if these parts share nodes, print the card again with --deck {DECK}"
+        in apart
     )
     assert "next: add these cards to the main deck" in merged
 
