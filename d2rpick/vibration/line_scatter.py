@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from d2rpick.vibration.midpoint import Reading
 
 # Upper limit of the correlation of neighbouring misfits [-], so that some of the states remain independent.
-_MOST_SHARED: Final = 0.9
+MOST_SHARED: Final = 0.9
 # Prior standard deviation of the frequency of a line, in cycles over the record [-].
 # The prior limits the uncertainty of spurious lines that are fitted to noise.
 _LOOSE_TURNS: Final = 0.5
@@ -55,7 +55,7 @@ class LineScatter:
             [averaged.lines.differentiate(times), averaged.mean.waves(times).real]
         )
         freedom = max(times.size - design.shape[1], 1)
-        shared = min(self.systematic, _MOST_SHARED)
+        shared = min(self.systematic, MOST_SHARED)
         # The number of independent states follows from a first-order autoregressive model.
         variance = np.sum(spectrum.rest**2) / freedom * (1 + shared) / (1 - shared)
         if variance <= 0:

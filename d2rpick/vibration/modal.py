@@ -24,7 +24,11 @@ from d2rpick.vibration.doubts import (
     StaticEnergy,
     measure_doubts,
 )
-from d2rpick.vibration.hidden_energy import find_most_hidden, measure_hidden_pairs
+from d2rpick.vibration.hidden_energy import (
+    RESOLVED,
+    find_most_hidden,
+    measure_hidden_pairs,
+)
 from d2rpick.vibration.line_scatter import LineScatter
 from d2rpick.vibration.lines import FIRST_PART, make_even_grid, predict
 from d2rpick.vibration.locked_lines import (
@@ -59,8 +63,6 @@ if TYPE_CHECKING:
 _FEWEST_STATES: Final = 32
 # A static energy up to this fraction of the mean vibration energy may be a fitting error [-].
 _NO_STATIC: Final = 0.12
-# Smallest relative energy range of a vibration [-]; single precision cannot resolve a smaller range.
-_RESOLVED: Final = 2e-7
 # Smallest divisor of energies, as a fraction of the energy range of the record [-].
 _TINY: Final = 1e-12
 # No line is ambiguous if mean energy and half of the peak energy differ by at least this fraction of the latter [-].
@@ -474,9 +476,7 @@ def identify_modal(
         return None
     grid = make_even_grid(time, energy)
     prediction = predict(grid)
-    if prediction is None or prediction.swing <= _RESOLVED * float(
-        np.abs(energy).max()
-    ):
+    if prediction is None or prediction.swing <= RESOLVED * float(np.abs(energy).max()):
         return None
     # If the prediction error is larger, the record is refused, whatever its lines.
     if prediction.missed <= MOST_MISSED:

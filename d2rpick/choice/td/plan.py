@@ -169,7 +169,7 @@ class RunPlan:
 
     @property
     def rigid_fraction(self) -> float:
-        """Fraction of the record that the windows cover that can be used without a further reference run [-]."""
+        """Fraction of the record covered by windows that can be used without a further reference run [-]."""
         return self.rigid_time / self.history.duration
 
     @property
