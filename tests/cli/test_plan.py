@@ -153,7 +153,8 @@ def test_where_all_planned_windows_are_poor_none_is_recommended(
     )
     poor = [row._replace(status="supported") for row in plan.flights[1:]]
     sentence = give_plan_sentence(replace(plan, flights=tuple(poor)))
-    assert sentence.startswith("do not use flights 2, 3: make rigid from ")
+    assert sentence.startswith("do not use flights 2, 3: rigid from ")
+    assert "is planned only because of `min_quality` poor" in sentence
 
 
 def test_the_card_holds_the_supported_windows_and_passes_check(
