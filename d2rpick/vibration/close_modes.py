@@ -35,7 +35,7 @@ _STRONGEST: Final = 3
 # Two modes describe the record equally well if twice the logarithm of the likelihood falls by at most this [-].
 _AS_WELL: Final = 4.0
 # _MOST_STEPS: largest number of steps of the fit; 10 are usual.
-# _CONVERGED: the fit ends with a step that reduces the rms misfit by at most this fraction [-].
+# _CONVERGED: the fit ends with a step that reduces the sum of squares by at most this fraction [-].
 _MOST_STEPS, _CONVERGED = 30, 1e-5
 # _DAMPING: damping of the first step of the Levenberg-Marquardt method, relative to the scaled normal matrix [-].
 # _LEAST_DAMPING: smallest damping of a step [-].
