@@ -27,12 +27,15 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
     from d2rpick.vibration.lines import Grid, Prediction
 
+# _MOST_STATIC: largest seemingly static energy of a beat, relative to the sum of the heights of all lines [-].
+# _LEAST_CHANGE: smallest change of the seemingly static energy that shows a beat, relative to that energy [-].
+_MOST_STATIC, _LEAST_CHANGE = 1.0, 0.1
 # Number of the strongest lines that are tried as the line of two close modes.
 _STRONGEST: Final = 3
 # Two modes describe the record equally well if twice the logarithm of the likelihood falls by at most this [-].
 _AS_WELL: Final = 4.0
 # _MOST_STEPS: largest number of steps of the fit; 10 are usual.
-# _CONVERGED: the fit ends with a step that reduces the rms misfit by at most this fraction [-].
+# _CONVERGED: the fit ends with a step that reduces the sum of squares by at most this fraction [-].
 _MOST_STEPS, _CONVERGED = 30, 1e-5
 # _DAMPING: damping of the first step of the Levenberg-Marquardt method, relative to the scaled normal matrix [-].
 # _LEAST_DAMPING: smallest damping of a step [-].
@@ -68,11 +71,13 @@ def _is_static_like_beat(grid: Grid, spectrum: Spectrum) -> bool:
     of_heights = float(heights[1] - heights[0])
     of_static = float(static[1] - static[0])
     is_seen = min(abs(of_heights), abs(of_static)) > least
+    is_changing = abs(of_static) > _LEAST_CHANGE * static.max()
     is_static = static > -least
+    is_small = static < _MOST_STATIC * heights
     total = heights + static
     is_bounded = total[1] < (1 + MOST_GROWTH) * total[0]
-    is_opposed = of_heights * of_static < 0
-    return bool(is_seen and is_opposed and is_bounded and np.all(is_static))
+    is_like_beat = is_seen and is_changing and of_heights * of_static < 0
+    return bool(is_like_beat and is_bounded and np.all(is_static & is_small))
 
 
 def _compute_ends(grid: Grid, spectrum: Spectrum) -> tuple[Samples, Samples]:
