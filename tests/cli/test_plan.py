@@ -202,6 +202,18 @@ def test_pictures_and_pages_are_written(history: list[str], tmp_path: Path) -> N
     assert "http://" not in text.replace("http://www.w3.org", "")
 
 
+def test_a_flight_without_a_usable_window_does_not_stop_a_script(
+    history: list[str],
+) -> None:
+    """The exit code is 1 only if no flight has a window that can be used in the next run."""
+    box = ("--part", "box", *history)
+    flights = run_json("plan", *box)["windows"]
+    statuses = [flight["status"] for flight in flights]
+    assert (statuses.count("supported"), statuses.count("left-out")) == (1, 2)
+    assert run("plan", "-q", *box).exit_code == 0
+    assert run("plan", "-q", "--min-rigid", "5", *box).exit_code == 1
+
+
 def test_nothing_to_recommend_is_an_objection(history: list[str]) -> None:
     assert (
         run("plan", "-q", "--min-rigid", "5", "-f", "card", *PART, *history).exit_code
