@@ -1,5 +1,4 @@
 # What `import d2rpick` offers, for type checkers and editors, which do not follow names that are imported on first use.
-from d2rpick.api.cards import JudgedCard as JudgedCard, card as card
 from d2rpick.api.checking import Findings as Findings, check as check
 from d2rpick.api.costs import (
     Calibration as Calibration,
@@ -7,6 +6,7 @@ from d2rpick.api.costs import (
     calibrate as calibrate,
     parts as parts,
 )
+from d2rpick.api.judged_cards import JudgedCard as JudgedCard, card as card
 from d2rpick.api.plans import (
     Exploration as Exploration,
     Plan as Plan,

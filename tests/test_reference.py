@@ -22,6 +22,13 @@ def test_a_page_of_the_reference_is_current(name: str) -> None:
     assert (PLACE / f"{name}.md").read_text("utf-8") == PAGES[name]()
 
 
+def test_every_key_of_json_has_a_meaning() -> None:
+    """Meanings are given where the fields are defined, so that the schemas contain them too."""
+    rows = re.findall(r"^\| (`.*`) \| .* \| (.*) \|$", PAGES["json"](), re.MULTILINE)
+    assert len(rows) > 700
+    assert not [key for key, meaning in rows if not meaning.strip()]
+
+
 def test_every_rule_has_an_anchor() -> None:
     assert {rule.lower() for rule in RULES} <= list_anchors(PLACE / "rules.md")
 

@@ -87,12 +87,12 @@ SCHEMAS = [
     f"schemas/{name}.json"
     for name in (
         *(
-            "suggest-1",
-            "explore-1",
+            "suggest-2",
+            "explore-2",
             "plan-1",
             "parts-1",
             "calibrate-1",
-            "verify-1",
+            "verify-2",
             "info-1",
             "check-1",
             "study-1",
@@ -325,7 +325,8 @@ def compute_share(modules: frozenset[str]) -> float:
             ((command, "--help"), "click", 0.12)
             for command in ("suggest", "explore", "info")
         ),
-        (("check", "-f", "json", DECK), "click", 0.21),
+        (("check", DECK), "click", 0.175),
+        (("check", "-f", "json", DECK), "click", 0.2),
         (("rule", "D2R201"), "click", 0.21),
         ((*CARD, "--part", "1"), "click", 0.12),
         ((*CARD, "--solver", "radioss", "--node", "1", "--end", "1"), "click", 0.12),

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 _NAMES = {
     "base.errors": "ChangedError ConfigurationError D2RPickError DeckError FormatError HistoryError RangeError",
     "api.suggestions": "Suggestion Verdict suggest verify",
-    "api.cards": "JudgedCard card",
+    "api.judged_cards": "JudgedCard card",
     "api.costs": "Calibration PartTable calibrate parts",
     "api.checking": "Findings check",
     "api.plans": "Exploration Plan explore plan",

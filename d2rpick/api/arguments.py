@@ -458,14 +458,14 @@ def check_path(name: str, value: Path) -> str:
 def read_windows(text: str, source: str) -> tuple[tuple[float, float], ...]:
     """Read windows from the output of ``d2rpick plan -f value``, in which each line ``tr td`` is a window.
 
-    The journal of a driven run is accepted too.
+    The journal of a driven run is accepted, too.
 
     Empty lines and lines that begin with ``#`` are skipped.
 
     Raises
     ------
     DeckError
-        For any other line, with its number, and if there is no window at all.
+        If there is any other line (the message has its number), or if there is no window.
     """
     windows: list[tuple[float, float]] = []
     if text.lstrip().startswith("{"):

@@ -1,6 +1,6 @@
 """Turn a request into a question: open the run, select the energy, and add the deck's settings and costs.
 
-The commands of one run and the Python functions use this; `d2rpick.choice.answers` computes the answer.
+The commands for one run and the Python functions use this module; `d2rpick.choice.answers` computes the answer.
 """
 
 from __future__ import annotations
@@ -38,8 +38,9 @@ if TYPE_CHECKING:
 class RunQuestion(NamedTuple):
     """A question: the opened run, the selected energy, and the settings by which the run is judged.
 
-    ``cautions`` name what the deck leaves unknown.  ``selection`` has the columns and parts, including those from the
-    deck.  ``on_card`` are parts that only the card contains, ``merge`` the part into which all are merged there.
+    ``cautions`` lists data that the deck does not define. ``selection`` contains the columns and parts, including those
+    from the deck. ``on_card`` contains parts that occur only on the card, and ``merge`` is the part into which the card
+    merges all parts.
     """
 
     run: Run
@@ -74,6 +75,7 @@ class RunQuestion(NamedTuple):
             question = question._replace(
                 options=("--no-deck", *question.options),
                 judging=(*question.judging, "--no-deck"),
+                unused_deck=self.unused_deck,
             )
         else:
             question = self.request.repeat()
@@ -150,9 +152,10 @@ def ask_run(
     run : Run
     request : Request
     card_alone : bool
-        Only a card is requested: it may have parts that the history lacks, and the energy is that of the model.
+        True if only a card is requested; it may contain parts that the history lacks, and the energy is then that of
+        the model.
     merge : int, optional
-        Part into which all others are merged on the card: they become one rigid body.
+        Part into which the card merges all others, so that they become one rigid body.
 
     Raises
     ------
@@ -211,7 +214,7 @@ def read_cost_model(request: Request) -> CostModel | None:
     Raises
     ------
     DeckError, ConfigurationError
-        If one of them cannot be read.
+        If the deck or the weights cannot be read.
     """
     if request.deck is None:
         return None

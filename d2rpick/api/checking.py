@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import os
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from typing import TYPE_CHECKING, Unpack
 
-from d2rpick.api import arguments
 from d2rpick.api.answer import Answer, build_frame
 from d2rpick.api.cards import SETTINGS
 from d2rpick.base.errors import Caution, ConfigurationError, D2RPickError, DeckError
@@ -16,7 +15,6 @@ from d2rpick.base.files import STDIN
 from d2rpick.deck import find_main_decks
 from d2rpick.deck.radioss_files import list_run_files
 from d2rpick.deck.restarts import is_restart
-from d2rpick.report.findings import FINDING, Checks
 from d2rpick.report.tables import make_positional
 from d2rpick.rules import RULES, Checked, Configuration, check_deck, find_configuration
 from d2rpick.rules.base import LS_DYNA, Severity, Unreadable
@@ -26,6 +24,7 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
+    from d2rpick.api import arguments
     from d2rpick.api.choosing import Choosing
     from d2rpick.api.request import Request
     from d2rpick.api.runs import Run
@@ -35,14 +34,26 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Findings(Answer, Checks):
+class Findings(Answer):
     """Answer from `check`; it is immutable.
 
-    ``findings`` have ``rule``, ``severity``, ``message``, ``file``, ``line`` and ``column``.  ``windows`` are the
-    windows in which parts are rigid.  ``notes`` report what the readers of the history left out or assumed, and unused
-    settings.
+    ``results`` contains the result of each deck, and ``failed`` the decks that could not be read. Paths below ``root``
+    are shown relative to it. ``history`` contains the files from which the windows were judged; it is None if there are
+    none. Findings less severe than ``fail_on`` are not failures. ``history_has_parts`` is True if the windows were
+    judged by the energies of their parts.
+
+    Each of the ``findings`` has ``rule``, ``severity``, ``message``, ``file``, ``line`` and ``column``. ``windows``
+    contains the windows in which parts are rigid. ``notes`` reports unused settings, and what was omitted or assumed
+    when the history was read.
     """
 
+    results: Sequence[Checked]
+    root: str = field(default_factory=os.getcwd)
+    failed: Sequence[Unreadable] = ()
+    cautions: tuple[Caution, ...] = ()
+    history: Sequence[str] | None = None
+    fail_on: Severity = Severity.ERROR
+    history_has_parts: bool = False
     command: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     kind = "findings"
@@ -86,6 +97,9 @@ class Findings(Answer, Checks):
         >>> d2.check("sample_data/switching.k", history=history).to_frame()["rule"].tolist()
         ['D2R202', 'D2R203']
         """
+        # Imported here to keep start-up fast.
+        from d2rpick.report.findings import FINDING
+
         return build_frame(
             self.to_dict()["findings"], FINDING.keys, decks=list(self.decks)
         )
@@ -106,11 +120,12 @@ def check(
     decks : path or several
         Main decks, read with their includes; a folder stands for its main decks, ``-`` for standard input.
     history : Run, optional
-        The run by whose history the windows are judged; it must not be switched.
+        Run whose history is used to judge the windows; it must not be switched.
     select, ignore : string or several
-        Rules by id or by the beginning of the id; default: the rules selected in the configuration nearest to the deck.
+        Rules, given by their ids or beginnings of ids; the default is the selection in the configuration nearest to the
+        deck.
     **choosing
-        How to judge, as for `suggest`.
+        Options that determine how the windows are judged, as for `suggest`.
 
     Returns
     -------
@@ -123,7 +138,7 @@ def check(
     ConfigurationError
         If a rule does not exist.
     TypeError, ValueError
-        If an argument is not of its kind, or says how to judge where there is no history.
+        If an argument has a wrong type or value, or if options for judging are given without a history.
 
     Examples
     --------
@@ -132,7 +147,9 @@ def check(
     >>> [(window.part, window.td) for window in found.windows]
     [(11, 0.0687534), (12, 0.064)]
     """
-    from d2rpick.api.asked import make_request  # Imported here to keep start-up fast.
+    # Imported here to keep the start of the command line fast.
+    from d2rpick.api import arguments
+    from d2rpick.api.asked import make_request
 
     names = arguments.list_paths("decks", decks)
     if history is not None:
@@ -195,6 +212,7 @@ def find_findings(
             *(Caution("unknown-rule", remark) for remark in remarks),
         ),
         history=run.sources if run else None,
+        history_has_parts=bool(run and run.parts and not request.energy),
         notes=(*(judge.notes if judge else ()), *unused_settings),
         fail_on=Severity(fail_on),
         command=command,

@@ -26,16 +26,16 @@ if TYPE_CHECKING:
     from d2rpick.api.choosing import Choosing
     from d2rpick.api.request import Request
     from d2rpick.api.runs import Run
-    from d2rpick.choice.switched.switched_run import Times
+    from d2rpick.base.spans import Times
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class PartTable(Paged, sets_of_parts.Parts):
     """Answer from `parts`; it is immutable.
 
-    ``rows`` has every part with its ``verdict`` and ``reasons``, ``sets`` the sets that are compared, ``recommended``
-    the set to use, None if no set is recommended; its ``parts`` and ``cost_share`` are arguments of `suggest` and
-    `plan`.
+    ``rows`` contains every part with its ``verdict`` and ``reasons``, and ``sets`` the sets that are compared.
+    ``recommended`` is the set to use; None if no set is recommended. Its ``parts`` and ``cost_share`` can be given to
+    `suggest` and `plan`.
     """
 
     run: Run
@@ -45,7 +45,7 @@ class PartTable(Paged, sets_of_parts.Parts):
     def to_frame(self) -> pd.DataFrame:
         """Return a table with a row for each part.
 
-        The columns are the keys of ``parts`` in the JSON; what is not known is NaN.
+        The columns are the keys of ``parts`` in the JSON output; unknown values are NaN.
 
         Examples
         --------
@@ -91,16 +91,16 @@ def parts(
     run : Run
         The run, opened with `read`; it must not be switched.
     deck : path, optional
-        Main deck of the run: of LS-DYNA, or a starter or engine file of Radioss.  Default: the only main deck in the
-        folder that was read; False for none.
+        Main deck of the run: an LS-DYNA deck, or a starter or engine file of Radioss.  The default is the only main
+        deck in the folder that was read; False means no deck.
     weights : Weights or path, optional
         Cost of an element by formulation, or the file that ``d2rpick calibrate`` wrote.
     given : number, title or several, optional
-        A set to be compared too.
+        Parts of an additional set that is compared with the others.
     tr, td : float or text, optional
-        The window to compare in, or its end alone [time].  Default: at the end of the longest flight.
+        Window in which the sets are compared, or only its end [time].  By default, it ends with the longest flight.
     **choosing
-        As for `suggest`.
+        Options as for `suggest`.
 
     Returns
     -------
@@ -109,9 +109,9 @@ def parts(
     Raises
     ------
     D2RPickError
-        If the deck or the weights cannot be read, or the run has no such parts.
+        If the deck or the weights cannot be read, or if the run has no such parts.
     TypeError, ValueError
-        If an argument is not of its kind.
+        If an argument has a wrong type or value.
 
     Examples
     --------
@@ -165,9 +165,10 @@ def check_times(tr: float | None, td: float | None) -> Times | float | None:
 class Calibration(Answer, calibration.FittedWeights):
     """Answer from `calibrate`; it is immutable.
 
-    ``weights`` are an argument of `parts`, `suggest`, `plan`, `explore` and `verify`.  ``told`` names the formulations
-    that the runs determine; the others keep the measured ratio.  ``misfit`` is relative to the time of a run segment
-    [-].  ``legs`` has the time of each segment per cycle [us], and what it computed.
+    ``weights`` can be given to `parts`, `suggest`, `plan`, `explore` and `verify`. ``told`` lists the formulations
+    whose weights the runs determine; all others keep their default ratio. ``misfit`` is the rms misfit relative to the
+    time of a restart segment [-]. ``legs`` contains the time per cycle [us] of each restart segment, and the elements
+    and nodes that it computed.
     """
 
     command: tuple[str, ...]
@@ -199,7 +200,8 @@ def calibrate(runs: arguments.Path | Iterable[arguments.Path]) -> Calibration:
     Parameters
     ----------
     runs : path or several
-        Folders, each with the deck of one run and what its solver printed; with and without switching of one model.
+        Folders, each with the deck of one run and its solver listings; the runs should be of one model, with and
+        without switching.
 
     Returns
     -------
@@ -208,9 +210,10 @@ def calibrate(runs: arguments.Path | Iterable[arguments.Path]) -> Calibration:
     Raises
     ------
     D2RPickError
-        If a folder is not that of one run, nothing says what a run took, or none is without rigid parts.
+        If a folder does not contain exactly one run, if no file contains the CPU time of a run, or if no run is without
+        rigid parts.
     TypeError, ValueError
-        If an argument is not of its kind.
+        If an argument has a wrong type or value.
 
     Examples
     --------

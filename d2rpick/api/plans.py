@@ -6,10 +6,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, Unpack
 
 from d2rpick.api import arguments
-from d2rpick.api.answer import RunAnswer, build_frame
+from d2rpick.api.answer import build_frame
 from d2rpick.api.asked import RunQuestion, ask_run, make_request
-from d2rpick.api.cards import CardOptions, Cards, JudgedCard, judge_and_print
+from d2rpick.api.cards import Cards
+from d2rpick.api.judged_cards import JudgedCard, judge_and_print
 from d2rpick.api.request import check_window
+from d2rpick.api.run_answer import RunAnswer
 from d2rpick.api.times import TimeArguments
 from d2rpick.base.errors import ArgumentError, DeckError
 from d2rpick.base.options import NOT_NEGATIVE
@@ -21,11 +23,12 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from d2rpick.api.arguments import Parts, Time
+    from d2rpick.api.cards import CardOptions
     from d2rpick.api.checking import Findings
     from d2rpick.api.choosing import Choosing
     from d2rpick.api.runs import Run
+    from d2rpick.base.spans import Times
     from d2rpick.choice.parts.cost import Weights
-    from d2rpick.choice.switched.switched_run import Times
 
 _STEPS: Final = 200  # Default number of td values that are explored.
 
@@ -34,10 +37,10 @@ _STEPS: Final = 200  # Default number of td values that are explored.
 class Exploration(RunAnswer, trade_off.TradeOff):
     """Answer from `explore`; it is immutable.
 
-    ``offers`` are sorted by td, each with ``tr``, ``error``, ``rigid_time``, ``unbeaten``, ``quality`` and its measures
-    in ``best``.  ``recommended`` is the offer that `suggest` chooses.  ``step`` is the nearest unbeaten td with half
-    the error of ``start``; ``start`` is the requested td or else the one that saves most.  ``answer`` is the result in
-    a sentence.
+    ``offers`` are sorted by td; each has ``tr``, ``error``, ``rigid_time``, ``unbeaten`` (True if Pareto-optimal),
+    ``quality``, and its measures in ``best``. ``recommended`` is the offer that `suggest` chooses. ``start`` is the
+    requested td or, if there is none, the td that saves most. ``step`` is the nearest Pareto-optimal td with half the
+    error of ``start``. ``answer`` is the result in one sentence.
     """
 
     kind = "trade_off"
@@ -107,13 +110,13 @@ def explore(
     run : Run
         The run, opened with `read`; it must not be switched.
     td : float or text, optional
-        A td to explore too, with which the others are compared [time].
+        Additional td, with which the others are compared [time].
     td_window : (float, float), optional
-        Range of td [time].  Default: the longest flight; if there is none but td is given, the record.
+        Range of td [time].  The default is the longest flight or, if there is none but td is given, the whole record.
     steps : int
         Number of evenly spaced values of td; the peaks of the energy are added.
     parts, flying, deck, weights, **choosing
-        As for `suggest`.
+        Arguments as for `suggest`.
 
     Returns
     -------
@@ -122,10 +125,10 @@ def explore(
     Raises
     ------
     D2RPickError
-        If the run has no such parts or energy, a time lies outside the record, or no flight is seen and no td
-        is named.
+        If the run has no such parts or energy, if a time lies outside the record, or if no flight is found and no td is
+        given.
     TypeError, ValueError
-        If an argument is not of its kind.
+        If an argument has a wrong type or value.
 
     Examples
     --------
@@ -163,10 +166,11 @@ def explore_for_question(
 class Plan(RunAnswer, planning.RunPlan):
     """Answer from `plan`; it is immutable.
 
-    ``flights`` has a row per flight with ``window``, ``status`` and ``reason``.  ``windows`` are the (tr, td) that this
-    run supports, ``all_windows`` also those that need a switched run first.  ``next_run`` are the windows of the next
-    run: those that are done and ``windows``, none if no window is new.  ``rigid_fraction`` is the share of the record
-    in which ``windows`` make the parts rigid.  Times in the unit of the run.
+    ``flights`` has a row per flight with ``window``, ``status`` and ``reason``. ``windows`` contains the windows (tr,
+    td) that this run supports; ``all_windows`` also contains those that require a switched run first. ``next_run``
+    contains the windows of the next run: those that are done and ``windows``; it is empty if no window is new.
+    ``rigid_fraction`` is the fraction of the record in which ``windows`` make the parts rigid. All times are in the
+    unit of the run.
     """
 
     kind = name = "plan"
@@ -191,7 +195,7 @@ class Plan(RunAnswer, planning.RunPlan):
     ) -> JudgedCard | None:
         """Print the card for the next run, and judge the printed times of its windows.
 
-        The card contains all new windows if ``every`` is True, else only the windows that the history supports.
+        The card contains all new windows if ``every`` is True, otherwise only the windows that the history supports.
         """
         return self.printed(
             Cards.for_run(self.question.run, options),
@@ -259,16 +263,16 @@ def plan(
     Parameters
     ----------
     run : Run
-        The run, opened with `read`; it must not be switched, except in the windows that are ``done``.
+        The run, opened with `read`; it must not be switched outside the windows ``done``.
     parts, flying, deck, weights, **choosing
-        As for `suggest`.
+        Arguments as for `suggest`.
     min_rigid : float or text, optional
-        Leave out shorter windows [time].  Default: 5 % of the record; a window that freezes vibration energy is also
-        left out if a later window is more than twice as long.
+        Shorter windows are left out [time].  The default is 5 % of the record; a window that freezes vibration energy
+        is then also left out if a later window is more than twice as long.
     done : pairs of float
         Windows (tr, td) in which the run was switched [time].
     before : Run, optional
-        The run that these were planned from; its landings are compared.
+        The run from which these windows were planned; the landings of both runs are compared.
 
     Returns
     -------
@@ -277,9 +281,9 @@ def plan(
     Raises
     ------
     D2RPickError
-        If the run has no such parts or energy, or its parts were deformable in a window that is done.
+        If the run has no such parts or energy, or if its parts were deformable in a window that is done.
     TypeError, ValueError
-        If an argument is not of its kind.
+        If an argument has a wrong type or value.
 
     Examples
     --------
@@ -341,7 +345,7 @@ def write_planned_deck(
 ) -> tuple[list[str], Findings]:
     """Write a copy of the plan's deck with the plan's card, and check the copy by means of the history.
 
-    Returns the names of the files, the main one first, and the findings in it.
+    Return the names of the files, beginning with the main file, and the findings in the copy.
     """
     from d2rpick.api.checking import check_written
     from d2rpick.deck.writing import write_deck

@@ -81,7 +81,7 @@ class ReadingOptions:
         *("file", "FILE"),
     )
     history: tuple[str, ...] = make_option(
-        "History of the reference run, by which the times are judged: file, folder or glob; repeatable.",
+        "History of the reference run, by which the times are judged: file, folder or pattern; repeatable.",
         *("file", "HISTORY"), many=True,
     )  # fmt: skip
     input_format: str = make_option(
@@ -114,7 +114,7 @@ class ReadingOptions:
 class Request(ChoiceOptions, ReadingOptions):
     """A question about a run, with times in the unit of the history; contradictions raise ArgumentError.
 
-    ``given`` names the options that were given, also those given with their default value.
+    ``given`` contains the names of the options that were given, including those given with their default value.
     """
 
     stiffness: float | None = _make_oscillator_option("Spring stiffness k.")

@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 class FirstRun(NamedTuple):
     """Result of `first`: the names of the ``files`` with the main deck first, and ``notes`` on what is unknown.
 
-    ``wait`` is the force-free time that counts as flight [time of the deck], ``reason`` its origin.
+    ``wait`` is the force-free time after which a flight is detected [time of the deck], and ``reason`` states where it
+    comes from.
     """
 
     files: tuple[str, ...]
@@ -45,17 +46,17 @@ def first(
     deck : path
         Main deck of LS-DYNA, or a file of a Radioss run with one engine file.
     output_dir : path
-        A folder other than that of the deck; created if it does not exist.
+        A folder other than that of the deck; it is created if it does not exist.
     parts : int, str or sequence of these, optional
-        Ids and id ranges of the parts to switch.  Default (Radioss): the parts of the rigid bodies that the engine file
-        deactivates.
+        Ids and id ranges of the parts to be switched.  For Radioss, the default is the parts of the rigid bodies that
+        the engine file deactivates.
     wait : float or text, optional
-        Time without force that counts as flight [time]; a string such as ``"5ms"`` if the deck names its units.
-        Default: half of the longest inner period, by masses and springs of the deck.
+        Force-free time after which a flight is detected [time]; it may be a string such as ``"5ms"`` if the deck names
+        its units. The default is half of the longest period of masses on springs in the deck.
     after : float or text, optional
         Earliest time at which parts become rigid [time].
     overwrite : bool
-        Replace files that exist.
+        Replace existing files.
 
     Returns
     -------
@@ -64,11 +65,12 @@ def first(
     Raises
     ------
     DeckError
-        If the deck shows no flight by contacts, or something else acts on the parts; if a file exists.
+        If the deck has no contact that shows a flight, if other loads act on the parts, or if a file already exists.
     RangeError
-        If the wait is below half of a period that is known.
+        If the waiting time is shorter than half of a known period.
     TypeError, ValueError
-        If an argument is not of its kind, or neither it nor the deck tells the parts or the wait.
+        If an argument has a wrong type or value, or if the parts or the waiting time are not given and do not follow
+        from the deck.
 
     Examples
     --------
@@ -112,26 +114,29 @@ def follow(
     Parameters
     ----------
     run : path
-        Folder, T01, glstat, matsum or binout, or a pattern for these, which need not be there yet.
+        Folder, T01, glstat, matsum or binout file, or a pattern; the files need not exist yet.
     parts : int, str or sequence of these, optional
-        The parts to switch.
+        The parts to be switched.
     wait : float or text, optional
-        Time without a force that counts as flight [time]; a string such as ``"5ms"`` if ``deck`` names its units.
-        Default: half of the longest inner period that is known.
+        Force-free time after which a flight is detected [time]; it may be a string such as ``"5ms"`` if ``deck`` names
+        its units. The default is half of the longest known internal period.
     deck : path, optional
         Main deck of the run, which defines gravity, supports, bodies, and the period of parts on springs.
     lasting : float, optional
-        Duration [s]; 0: only the events so far.  Default: until the run has ended.
+        Time for which the run is followed [s]; 0 returns only the events so far. By default, the run is followed until
+        it ends.
 
     Returns
     -------
     iterator of Event
-        With ``event``, ``time``, ``seen``, ``message``, ``wait``, ``left``, ``tr``; the last one is the state.
+        Events with ``event``, ``time``, ``seen``, ``message``, ``wait``, ``left`` and ``tr``; the last event describes
+        the current state of the run.
 
     Raises
     ------
     D2RPickError
-        If the run or the deck cannot be read, has no such parts, or ``wait`` is below half of a known period.
+        If the run or the deck cannot be read, if there are no such parts, or if ``wait`` is shorter than half of a
+        known period.
 
     Examples
     --------

@@ -26,12 +26,12 @@ if TYPE_CHECKING:
 class Run:
     """One run: its opened files, and the table columns that the user assigned to quantities; it is immutable.
 
-    A run can be pickled: a copy, also in another process, contains the same bytes, or opens the same big files again.
-    Two runs are equal if the same bytes were read under the same names, in the same way.
+    A run can be pickled: a copy, even in another process, contains the same bytes, or opens the same large files again.
+    Two runs are equal if the same bytes were read under the same names and in the same way.
 
-    ``files`` are the opened files, ``chosen`` the columns, ``input_format`` the format as which the files were read,
-    ``"auto"`` if their content decided.  ``folder`` is the folder that was named; the main deck is searched there.
-    Energies are read only when they are needed.
+    ``files`` contains the opened files, and ``chosen`` the selected columns. ``input_format`` is the format that the
+    user gave, or ``"auto"`` if it was detected from the content. ``folder`` is the folder that the user gave, in which
+    the main deck is searched for. Energies are read only when they are needed.
     """
 
     files: histories.OpenedRun
@@ -96,8 +96,8 @@ class Run:
     def overview(self, deck: arguments.Deck | None = None) -> Overview:
         """Return what ``d2rpick info`` shows: format, states, sampling, channels, parts, flights and health.
 
-        The main ``deck`` of the run tells gravity, supports and imposed motion.  Default: the only main deck in the
-        folder that was read; False for none.
+        The main ``deck`` of the run defines gravity, supports and prescribed motion. The default is the only main deck
+        in the folder that was read; False means no deck.
         """
         from d2rpick.choice.overview import describe_run
 
@@ -122,21 +122,22 @@ class Run:
         Parameters
         ----------
         parts : number, title or several, optional
-            Whose internal energies: as ``suggest`` takes them, or ``"all"``.  Default: the energy that ``suggest``
-            takes if it has no parts.
+            Parts whose internal energies are returned, given as for ``suggest``, or ``"all"``. The default is the
+            energy that ``suggest`` uses without parts.
 
         Returns
         -------
         pandas.DataFrame
-            Index ``time``, shape (states, parts) with the part's title as the name of its column (``part 3`` if it has
-            no title, ``door (7)`` where several have it), or (states, 1) with ``internal_energy`` [energy].  ``attrs``:
-            ``source``, ``format``, ``channel``, ``time_unit`` (empty where no file names it), ``titles`` of the parts
-            by number, ``ids`` by the name of the column, and ``notes``.
+            Table with the index ``time``. It has the shape (states, parts), and the name of a column is the title of
+            the part (``part 3`` if there is no title, ``door (7)`` if several parts have the same title). Without
+            parts, it has the shape (states, 1) with the column ``internal_energy`` [energy]. ``attrs`` contains
+            ``source``, ``format``, ``channel``, ``time_unit`` (empty if no file contains it), the ``titles`` of the
+            parts by number, the ``ids`` by column name, and ``notes``.
 
         Raises
         ------
         FormatError
-            If there are no such parts, or no energy.
+            If the run has no such parts or no energy.
 
         Examples
         --------
@@ -188,13 +189,15 @@ def read(
     Parameters
     ----------
     source : path, several, or an open binary file
-        A file, a folder, a glob, the restart segments of a run, companion files in other formats; a string is one path.
+        A file, a folder, a pattern, the restart segments of a run, or companion files in other formats; a string is a
+        single path.
     time, energy : str or int, optional
-        Columns, labels or HDF5 paths, by name or 1-based number; several energies are added.
+        Columns, labels or HDF5 paths, given by name or 1-based number; several energies are added.
     channels : mapping, optional
-        Channels of other quantities whose names are unusual, as ``{"kinetic_energy": "E2"}``; as ``--channel``.
+        Channels of other quantities with unusual names, e.g. ``{"kinetic_energy": "E2"}``, like the option
+        ``--channel``.
     input_format : str
-        ``"auto"`` (by content), or one of csv, hdf5, glstat, matsum, binout, radioss-th.
+        ``"auto"`` to detect the format from the content, or one of csv, hdf5, glstat, matsum, binout, radioss-th.
 
     Returns
     -------
@@ -203,9 +206,10 @@ def read(
     Raises
     ------
     D2RPickError
-        If a file cannot be read as the history of a run; one line that says where, what and what to do.
+        If a file cannot be read as the history of a run; the message states the place, the problem and what to do in
+        one line.
     TypeError, ValueError
-        If an argument is not of its kind.
+        If an argument has a wrong type or value.
 
     Examples
     --------
@@ -250,19 +254,20 @@ def from_frame(
 ) -> Run:
     """Take the energies of a run from a pandas, polars, pyarrow, xarray or numpy table.
 
-    The table is checked like the CSV file that ``frame.to_csv()`` writes: times must rise, values must be finite
-    numbers.
+    The table is checked like the CSV file that ``frame.to_csv()`` writes: times must increase, and values must be
+    finite numbers.
 
     Parameters
     ----------
     frame : DataFrame or Series of pandas, table of polars, pyarrow or xarray, array of numpy, or mapping of columns
-        A row per state.  The times are a column, coordinate or index, by a name such as ``time`` or that of ``time``,
-        never the numbers of the rows; timedeltas are seconds.  A Series is the internal energy.  Columns of an array
-        have no names: the first is the time, others are named by number, as ``energy=3``.
+        Table with a row per state.  The times are a column, coordinate or index with a name such as ``time``, or the
+        one that the argument ``time`` names, but never the row numbers; timedeltas are converted to seconds.  A Series
+        is treated as the internal energy.  The columns of an array have no names: the first is the time, and others are
+        given by number, e.g. ``energy=3``.
     time, energy, channels : optional
         Columns as for ``read``.
     name : str
-        What messages call it.
+        Name of the table in messages.
 
     Returns
     -------
@@ -271,9 +276,9 @@ def from_frame(
     Raises
     ------
     D2RPickError
-        If it is not the history of a run.
+        If the table is not the history of a run.
     TypeError, ValueError
-        If ``frame`` is no table, or nothing of it is named as the time.
+        If ``frame`` is not a table, or if no part of it is named as the time.
 
     Examples
     --------
@@ -410,8 +415,9 @@ def extract_columns(
 ) -> tuple[dict[str, Samples], tuple[str, ...]]:
     """Return the selected columns of a run, all quantities known at the same times, and notes on them.
 
-    ``time`` and ``internal_energy``, with several parts ``part_<id>`` for each, ``not_chosen_part_<id>`` for each part
-    that flies with them, then quantities of the whole model and the momentum that shows the flight, each of shape (n,).
+    The columns, each of shape (n,), are ``time``, ``internal_energy``, ``part_<id>`` for each part if there are
+    several, ``not_chosen_part_<id>`` for each other part that flies with them, quantities of the whole model, and the
+    momentum that shows the flight.
     """
     from d2rpick.base.errors import list_names
     from d2rpick.choice.question import Reference
@@ -452,7 +458,8 @@ def extract_columns(
 def _list_model_columns(history: History) -> dict[str, Samples]:
     """Return the energy terms of the whole model by name; empty if their times differ from those of the energy.
 
-    The kinetic energy includes rotation.  The internal energy is included if the selected energy is that of some parts.
+    The kinetic energy includes that of rotation. The internal energy is included only if the selected energy is that of
+    some parts.
     """
     import numpy as np
 

@@ -51,9 +51,10 @@ _LAST: Final = b'{"schema": '
 class Study(Paged, core.StudyOfRuns):
     """Answer from `study`; it is immutable.
 
-    ``runs`` has a row per run.  ``agree`` is True if the intervals of tr intersect, None if there is no tr.  ``common``
-    is one tr for all judged runs, with the window they share and the ``errors`` of the runs at it, or None with the
-    reason.  Times are in the unit of the runs; ``td`` is None if each run has its own.
+    ``runs`` has a row per run. ``agree`` is True if the tr intervals of all runs overlap; None if there is no tr.
+    ``common`` contains one tr for all judged runs, with the window that they share and the ``errors`` of the runs at
+    this tr; if there is no such tr, it contains None and the reason. Times are in the unit of the runs; ``td`` is None
+    if each run has its own td.
     """
 
     command: tuple[str, ...]
@@ -90,27 +91,29 @@ def study(
     Parameters
     ----------
     runs : several paths
-        Each a file, or a folder with the files of one run; patterns are replaced by what they match, each a run.
+        Each path is a file, or a folder with the files of one run; each match of a pattern is a run.
     td : float or text, optional
-        When the parts are switched back [time]; a string such as ``"64ms"`` if all runs name the same unit.
+        Time at which the parts become deformable again [time]; it may be a string such as ``"64ms"`` if all runs name
+        the same unit.
     td_window : (float, float), optional
-        Instead of ``td``: the range in which each run chooses its own td [time]; by default its longest flight.
+        Range in which each run gets its own td, instead of ``td`` [time]; the default is the longest flight of the run.
     parts, flying, **choosing
-        As for `suggest`.
+        Arguments as for `suggest`.
     time, energy, channels, input_format
-        As for `read`.
+        Arguments as for `read`.
     jobs : int
-        Processes that work at the same time.  In a script more than 1 need its guard ``if __name__ == "__main__":``.
+        Number of processes that work at the same time.  If it is above 1, a script needs the guard ``if __name__ ==
+        "__main__":``.
 
     Returns
     -------
     Study
-        A run that cannot be read has a row that says why.
+        The answer; the row of a run that cannot be read states the reason.
 
     Raises
     ------
     TypeError, ValueError
-        If an argument is not of its kind.
+        If an argument has a wrong type or value.
 
     Examples
     --------
@@ -207,11 +210,11 @@ def compute_rows(
     farm : Farm
         Computes the rows that are not in the ledger.
     ledger : Ledger, optional
-        Contains rows already, and gets the new ones.
+        File of rows that are already computed, to which new rows are appended.
     absolute : bool
-        True if the processes of the farm work in other folders.
+        True if the processes of the farm work in other folders, so that they need absolute paths.
     told : function, optional
-        Called with the number of finished rows, first with those from the ledger.
+        Function that is called with the number of finished rows, initially with the number of rows from the ledger.
     """
     known_rows = dict(ledger.known) if ledger else {}
     new = [number for number in range(len(sources)) if number not in known_rows]
@@ -265,7 +268,7 @@ def write_row(row: StudyRow, question_digest: str) -> str:
 class Ledger:
     """A file of finished rows, one per line; the file need not exist yet.
 
-    Damaged lines are skipped, among them an incomplete last line of a killed study.
+    Damaged lines are skipped, including an incomplete last line of a killed study.
 
     Raises
     ------

@@ -7,15 +7,12 @@ from functools import partial
 from typing import TYPE_CHECKING, Unpack
 
 from d2rpick.api import arguments
-from d2rpick.api.answer import RunAnswer, build_frame
+from d2rpick.api.answer import build_frame
 from d2rpick.api.asked import RunQuestion, ask_run, make_request
-from d2rpick.api.cards import (
-    CardOptions,
-    Cards,
-    JudgedCard,
-    judge_and_print as card_judged,
-)
+from d2rpick.api.cards import Cards
+from d2rpick.api.judged_cards import JudgedCard, judge_and_print as card_judged
 from d2rpick.api.request import MIN_MEAN_ENERGY, choose_time_or_window
+from d2rpick.api.run_answer import RunAnswer
 from d2rpick.api.times import TimeArguments
 from d2rpick.base.errors import ArgumentError
 from d2rpick.base.options import FRACTION
@@ -28,6 +25,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from d2rpick.api.arguments import Parts, Time
+    from d2rpick.api.cards import CardOptions
     from d2rpick.api.choosing import Choosing
     from d2rpick.api.runs import Run
     from d2rpick.choice.pair.candidates import Pair
@@ -38,9 +36,9 @@ if TYPE_CHECKING:
 class Suggestion(RunAnswer, answers.PairSuggestion):
     """Answer from `suggest`; it is immutable.
 
-    ``candidates`` are ranked, best first.  ``recommended`` and ``better_pair`` have ``tr``, ``td`` and ``residual``, or
-    are None, with the reason in ``warnings``; the better pair may be the recommended pair.  ``quality`` of the
-    recommended pair has ``grade`` good, fair or poor and ``reasons``.
+    ``candidates`` are in order of rank, best first. ``recommended`` and ``better_pair`` have ``tr``, ``td`` and
+    ``residual``, or are None, with the reason in ``warnings``; the better pair may be the recommended pair. ``quality``
+    of the recommended pair has a ``grade`` (good, fair or poor) and ``reasons``.
     """
 
     kind = "suggestion"
@@ -52,8 +50,8 @@ class Suggestion(RunAnswer, answers.PairSuggestion):
         Returns
         -------
         pandas.DataFrame
-            A row per candidate, best first, a column per key of ``candidates`` in the JSON; what is not known is NaN.
-            ``attrs``: ``td``, ``basis``, ``source``.
+            Table with a row per candidate, best first, and a column per key of ``candidates`` in the JSON output;
+            unknown values are NaN. ``attrs`` contains ``td``, ``basis`` and ``source``.
 
         Examples
         --------
@@ -111,9 +109,9 @@ class Suggestion(RunAnswer, answers.PairSuggestion):
 class Verdict(RunAnswer, answers.PairVerdict):
     """Answer from `verify`; it is immutable.
 
-    ``verified``: the pair is good.  ``reasons``: why it is not, or what to keep in mind.  ``tr_ok`` and ``td_ok`` are
-    None if the record does not show it.  ``candidate`` has the measures of the pair; ``quality`` is None if the pair is
-    not verified.
+    ``verified`` is True if the pair can be used. ``reasons`` states why it cannot be used, or what to keep in mind.
+    ``tr_ok`` and ``td_ok`` are None if the record does not show whether the time is suitable. ``candidate`` contains
+    the measures of the pair; ``quality`` is None if the pair is not verified.
     """
 
     compared: Run | None = None
@@ -182,22 +180,25 @@ def suggest(
     run : Run
         The run, opened with `read`; it must not be switched.
     td : float or text
-        When the parts are switched back [time]; a string with a unit, such as ``"64ms"``, if the run names its own.
+        Time at which the parts become deformable again [time]; it may be a string with a unit, such as ``"64ms"``, if
+        the run names its unit.
     td_window : (float, float)
-        Instead of ``td``: the range in which td is chosen [time]; by default the longest flight.
+        Range in which td is chosen, instead of ``td`` [time]; the default is the longest flight.
     parts : number, title or several, optional
-        The parts to be switched; ``"10-19"`` is a range, ``"flying"`` all deformable parts that fly together,
-        ``"all"`` all that have energy.
+        The parts to be switched; ``"10-19"`` is a range, ``"flying"`` stands for all deformable parts that fly
+        together, and ``"all"`` for all parts that have energy.
     flying : number, title or several, optional
-        What flies together with them.
+        Parts that fly together with these parts.
     deck : path, optional
-        Main deck of the run: it defines the cost of the parts, the springs, the rigid bodies, and the parts of
-        ``"recommended"``.  Without it the parts are assumed to become one rigid body, see ``position_error_assumes`` of
-        a candidate.  Default: the only main deck in the folder that was read; False for none.
+        Main deck of the run, which defines the cost of the parts, the springs, the rigid bodies, and the parts of
+        ``"recommended"``.  Without a deck, the parts are assumed to become one rigid body, see
+        ``position_error_assumes`` of a candidate.  The default is the only main deck in the folder that was read; False
+        means no deck.
     weights : Weights or path, optional
         Cost of an element by formulation, or the file that ``d2rpick calibrate`` wrote.
     **choosing
-        How to choose, for example ``tolerance`` or ``max_residual``: see ``d2rpick.api.choosing.Choosing``.
+        Options that determine the choice, for example ``tolerance`` or ``max_residual``: see
+        ``d2rpick.api.choosing.Choosing``.
 
     Returns
     -------
@@ -206,9 +207,9 @@ def suggest(
     Raises
     ------
     D2RPickError
-        If the run has no such parts or energy, or td lies outside the record.
+        If the run has no such parts or energy, or if td lies outside the record.
     TypeError, ValueError
-        If an argument is not of its kind.
+        If an argument has a wrong type or value.
 
     Examples
     --------
@@ -270,14 +271,14 @@ def verify(
     run : Run
         The run, opened with `read`; it must not be switched.
     tr, td : float or text
-        Switch times [time], or strings such as ``"64ms"``; with ``switched`` they are read off that run where they are
-        not given.
+        Switch times [time], or strings such as ``"64ms"``; times that are not given are determined from ``switched``.
     switched : Run, optional
         A finished run with these switch times, to be compared with ``run``.
     min_mean_energy : float
-        Mean energy of the switched run after td over that of ``run``, at least; it may be as far above 1 as below [-].
+        Smallest accepted mean energy of the switched run after td, relative to that of ``run`` [-]; the largest is 2
+        minus this value.
     parts, flying, deck, weights, **choosing
-        As for `suggest`.
+        Arguments as for `suggest`.
 
     Returns
     -------
@@ -286,9 +287,9 @@ def verify(
     Raises
     ------
     D2RPickError
-        If the run has no such parts or energy, a time lies outside the record, or tr is not before td.
+        If the run has no such parts or energy, if a time lies outside the record, or if tr is not before td.
     TypeError, ValueError
-        If an argument is not of its kind.
+        If an argument has a wrong type or value.
 
     Examples
     --------
@@ -326,7 +327,7 @@ def judge_pair(
     switched: Run | None = None,
     min_mean_energy: float = MIN_MEAN_ENERGY,
 ) -> Verdict:
-    """Judge a pair. A finished switched run, if given, is compared as well, and defines times that are not given."""
+    """Judge a pair. A finished switched run is compared with the reference run, and supplies omitted times."""
     check_pair(tr, td, switched)
     switched_reference = switched and question.reference.like(
         switched.files, question.selection

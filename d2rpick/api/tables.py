@@ -47,12 +47,12 @@ def convert_to_frame(table: Any) -> pd.DataFrame:
     Parameters
     ----------
     table : pandas, polars, pyarrow or xarray object, numpy array, or mapping of columns
-        A Series or DataArray is the internal energy.  An array of numbers (n, k) has columns without names.
+        A Series or DataArray is treated as the internal energy.  An array of numbers (n, k) has columns without names.
 
     Raises
     ------
     TypeError
-        If it is nothing of that.
+        If the value is none of these.
     """
     import pandas as pd
 

@@ -33,7 +33,7 @@ _WITHOUT_RUN: Final = TimeUnit("", "the arguments, which contain no run")
 class TimeArguments:
     """Check arguments that are times: numbers in the unit of a run, or strings with a unit, e.g. "64ms".
 
-    ``find_unit`` returns the unit to which strings are converted.  It is called only if there is a string, since it
+    ``find_unit`` returns the unit to which strings are converted. It is called only if there is a string, because it
     may have to open a run.
 
     Examples
@@ -168,7 +168,7 @@ def convert_typed_time(text: str, unit: str, source: str) -> float:
     Raises
     ------
     ArgumentError
-        If the unit of the run is not known; the message has the number to give for s and ms.
+        If the unit of the run is not known; the message states the numbers to give for a run in s and in ms.
 
     Examples
     --------

@@ -166,7 +166,7 @@ class FileState(NamedTuple):
 
 
 def compute_slowness(changed: int, size: int) -> int:
-    """Return the extra time before a state is treated as settled [ns]; large files and coarse file times need more."""
+    """Return the extra time for which a file must be unchanged [ns]; large files and coarse time stamps need more."""
     return _SLOWEST * size + (0 if changed % 1_000_000_000 else _COARSE)
 
 

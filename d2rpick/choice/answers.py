@@ -1,7 +1,7 @@
 """Answer ``suggest`` and ``verify``: recommend a pair with alternatives, or judge a given pair.
 
-The command line, ``study``, ``check --history``, ``card`` and Python all call these functions, so that they give the
-same numbers.
+The commands (including ``study``, ``check --history`` and ``card``) and the Python functions all call these functions,
+so that their numbers agree.
 """
 
 from __future__ import annotations
@@ -70,9 +70,9 @@ _MOST_REFUSED = 3
 class PairVerdict(AnswerAtTd):
     """The answer of ``verify``: the measures of one pair, and the reasons for and against it.
 
-    ``tr_ok`` and ``td_ok`` are None if the record does not show it.  ``remarks`` are those of the ``reasons`` that do
-    not count against the pair, or that the residual says as well.  ``computed`` is the energy of the finished
-    switched run, if there is one.
+    ``tr_ok`` and ``td_ok`` are None if the record does not show whether the time is suitable. ``remarks`` are the
+    ``reasons`` that are not objections to the pair, or that only repeat that the residual is large. ``computed``
+    contains the comparison with a finished switched run, if there is one.
     """
 
     situation: Situation
@@ -135,19 +135,31 @@ class PairVerdict(AnswerAtTd):
 
     @cached_property
     def better(self) -> Pair | None:
-        """A better pair with a grade other than "poor", at this td or at the nearest suitable peak; otherwise None."""
-        return None if self._is_refuted else self._good_pair
+        """A better pair with a grade other than "poor": that of ``suggest`` for this td, or what it names as better."""
+        if self._is_refuted:
+            return None
+        good = self._good_pair
+        if good is None or good.td != self.situation.td:
+            return good
+        decision = decide_with_better_pair(self._suggestion)
+        return decision.better if decision and decision.better else good
+
+    @cached_property
+    def _suggestion(self) -> PairSuggestion:
+        """The answer of ``suggest`` for this td, from the reference run alone."""
+        return suggest_at(self.situation)
 
     @cached_property
     def _good_pair(self) -> Pair | None:
         """The pair recommended from the reference run alone, even if a finished switched run is known."""
-        return find_good_pair(self.situation)
+        return find_good_pair(self._suggestion)
 
     @property
     def _is_refuted(self) -> bool:
         """True if the finished switched run contradicts the pair that the reference run recommends.
 
-        A switched run with any tr within the timing tolerance tests that pair.
+        A switched run tests the recommended pair if its tr differs from that of the pair by no more than the timing
+        tolerance.
         """
         if self.switched is None or not self.switched.objections:
             return False
@@ -260,9 +272,9 @@ class AcceptableWindow(NamedTuple):
 class PairSuggestion(AnswerAtTd):
     """The answer of ``suggest``: ranked candidates, the recommended pair, a better pair at another td, and warnings.
 
-    ``td_window`` is the window in which td was chosen, None if td was given; ``compared_td`` is the part of it in which
-    all td were compared, since they keep the margin.  ``longer`` is the longest acceptable pair in the window, if much
-    rigid time was given up for quality.
+    ``td_window`` is the window in which td was chosen; None if td was given. ``compared_td`` is the part of this window
+    that keeps the margin; all td in it were compared. ``longer`` is the longest acceptable pair in the window, if the
+    recommended pair is much shorter but better.
     """
 
     situation: Situation
@@ -383,7 +395,18 @@ class PairSuggestion(AnswerAtTd):
             objections=(*objections, *messages),
             is_admissible=candidate.admissible,
             best_residual=self.recommended.residual if self.recommended else None,
+            better=self._find_better_than(candidate),
+            best_of=None if self.clearly_better else self.compared_td,
         )
+
+    def _find_better_than(self, candidate: Candidate) -> Pair | None:
+        """Return a pair that is clearly better than a candidate: at another td, or else the recommended one."""
+        recommended = self.recommended
+        is_usable = self.decision is not None and self.decision.grade != POOR
+        if self._good_pair or recommended is None or not is_usable:
+            return self._good_pair
+        is_better = _has_smaller_residual(recommended, candidate)
+        return recommended if is_better or not candidate.admissible else None
 
     @property
     def quality(self) -> Quality | None:
@@ -399,7 +422,7 @@ class PairSuggestion(AnswerAtTd):
     def clearly_better(self) -> Pair | None:
         """Another pair that is clearly better than the recommended pair; None if there is none.
 
-        Residuals are compared; on basis "energy" the amplitudes of the levels at td.
+        Residuals are compared or, on the basis "energy", the amplitudes that correspond to the energies at td.
         """
         better = self.better_pair
         recommended = self.recommended
@@ -439,8 +462,8 @@ def compare_in_flight(
 ) -> Decision:
     """Add to the decision on a pair a clearly better pair of the same flight, or the td range without a better pair.
 
-    The flight is searched only if another time may be better, and no better pair whose residual is at most 0.5 is yet
-    known.
+    The flight is searched only if another time may be better, and if no better pair with a residual of at most 0.5 is
+    known yet.
     """
     is_refused = decision.objections or decision.grade != decision.quality.grade
     needs_other_times = is_refused or any(
@@ -541,7 +564,7 @@ def suggest_at(
 def find_better_pair(situation: Situation) -> Pair | None:
     """Return the recommended pair at the nearest energy peak for which a pair is recommended; None if there is none.
 
-    The record is examined anew at that td, so that the pair is what ``suggest`` recommends for that td.
+    The record is examined again at the td of this peak, so the pair is the one that ``suggest`` recommends for this td.
     """
     start = situation.earliest_tr
     if start is None:
@@ -571,9 +594,8 @@ def find_better_pair(situation: Situation) -> Pair | None:
     return None
 
 
-def find_good_pair(situation: Situation) -> Pair | None:
+def find_good_pair(answer: PairSuggestion) -> Pair | None:
     """Return a pair whose grade is not "poor": the recommended pair at this td or else a better pair at another td."""
-    answer = suggest_at(situation)
     if answer.decision and answer.decision.grade != POOR:
         return answer.recommended
     return _drop_poor(answer.better_pair)
@@ -589,7 +611,7 @@ def _drop_poor(pair: Pair | None) -> Pair | None:
 def _is_level_refused(situation: Situation) -> bool:
     """Return True if no tr can match the energy level at td because the level is negative or too high.
 
-    This test saves time, since noise makes thousands of such peaks.
+    This test saves time, because noise causes thousands of such peaks.
     """
     if situation.basis != "energy":
         return False
@@ -667,13 +689,14 @@ def suggest_in_run(
 ) -> PairSuggestion:
     """Choose tr for ``td``, or both times if ``td`` is a time range (low, high) or None (the longest flight) [time].
 
-    If ``with_better`` is False, no better td than a given td is determined.  If td is chosen, no flight is assumed to
-    begin before ``since``, and ``times`` are tried in addition to the energy peaks, by default an even grid [time].
+    If ``with_better`` is False, no search for a better td than the given one is made. If td is chosen, no flight is
+    assumed to begin before ``since`` [time]. In addition to the energy peaks, the td in ``times`` [time] are tried, by
+    default an even grid.
 
     Raises
     ------
     RangeError
-        If td or the window lies outside the record, there is no flight, or the run cannot be judged.
+        If td or the window lies outside the record, if there is no flight, or if the run cannot be judged.
     """
     refuse_unsound(reference.history, settings, td)
     if td is None or isinstance(td, tuple):
@@ -735,7 +758,7 @@ def verify_run(
 def _add_health(answer: _Answer, run: OpenedRun) -> _Answer:
     """Add the health of the run and its warnings, for the rigid window or, if no pair exists, for the flight up to td.
 
-    The time after td does not matter for the choice.
+    States after td are ignored, because they do not affect the choice.
     """
     answer = replace(
         answer, cautions=(*answer.cautions, *warn_about_engine(run.sources))

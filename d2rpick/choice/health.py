@@ -1,7 +1,7 @@
 """Judge the health of a run: whether its energies are reliable, which loads act in the window, and why it is refused.
 
-A term that the files lack gives None, never 0.  Shares are relative to the peak of the internal energy, as is usual
-in practice, and are None if that peak is tiny.
+If the files lack an energy term, the results that need it are None, never 0. Shares are relative to the peak internal
+energy, as is usual in practice, and are None if this peak is tiny.
 """
 
 from __future__ import annotations
@@ -66,11 +66,12 @@ _NOTHING: Final = 1e-20
 class Health(NamedTuple):
     """Health of a run up to the time ``until``. The fields are the keys of the JSON output; None if a value is unknown.
 
-    Shares refer to the peak internal energy of the model; ``part_hourglass_share`` to that of ``part``, the worst of
-    the chosen parts.  The energy ratio is the total energy over the initial energy and the external work.  The last
-    three shares refer to the mean energy of the chosen parts in ``window`` [time]: the change of the contact energy,
-    the external work beyond gravity and damping, and the growth of the eroded energy.  ``reason`` states why shares are
-    None although energies are written, ``window_reason`` why the work in the window is.
+    Shares are relative to the peak internal energy of the model, except ``part_hourglass_share``, which is relative to
+    that of ``part``, the chosen part with the largest share. The energy ratio is the total energy divided by the sum of
+    the initial energy and the external work. The last three shares are relative to the mean energy of the chosen parts
+    in ``window`` [time]: the change of the contact energy, the external work beyond gravity and damping, and the growth
+    of the eroded energy. ``reason`` states why shares are None although energies are written, and ``window_reason`` why
+    the external work in the window is None.
     """
 
     hourglass_share: float | None = None
@@ -104,9 +105,9 @@ def assess_health(
     window : (float, float), optional
         Free flight, or the rigid window [time].
     locked : float, optional
-        Mean energy of the chosen parts in the window; default: that of the model [energy].
+        Mean energy of the chosen parts in the window [energy]; the default is that of the model.
     until : float, optional
-        End of the balance, which messages give with each figure [time].
+        End of the balance [time], which messages state with each figure.
     """
     peak = _find_peak(balance)
     if balance.internal is not None and peak is None:
@@ -147,7 +148,8 @@ def _explain_few_states(balance: Balance, window: tuple[float, float]) -> str | 
 def warn_about_health(health: Health, *, at_rest: bool = False) -> Iterator[Caution]:
     """Yield the warnings about the health of a run; their codes are stable.
 
-    If nothing vibrates (``at_rest``), no level of the internal energy is matched, so hourglass energy does not matter.
+    If nothing vibrates (``at_rest``), no level of the internal energy has to be matched, so hourglass energy does not
+    matter.
     """
     up_to = "" if health.until is None else f" up to {health.until:.6g}"
     where = "from {:.6g} to {:.6g}".format(*health.window) if health.window else ""
@@ -344,8 +346,8 @@ def refuse_unsound(
 
     It is also raised if the load ends outside the record according to the settings.
 
-    With ``choosing`` also raise it if nothing deforms.  The given times are ``td`` or a window for it, and the start
-    and end of the flight in the settings.
+    If ``choosing`` is True, it is also raised if nothing deforms. The given times are ``td``, which may be a window,
+    and the start and end of the flight in the settings.
     """
     for caution in list_flaws(history):
         if choosing or caution.code != "nothing-to-judge":
@@ -376,7 +378,7 @@ def list_flaws(history: History) -> Iterator[Caution]:
     if reason:
         yield Caution("blew-up", reason)
     elif _has_no_energy(history):
-        reason = f"nothing to judge: no internal energy exceeds {highest:.3g}, so nothing deforms"
+        reason = f"nothing to judge: no internal energy exceeds {highest:.3g}, so nothing deforms; give a longer run"
         yield Caution("nothing-to-judge", reason)
 
 

@@ -15,10 +15,11 @@ from d2rpick.histories.formats import READERS
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
+    from d2rpick.base.spans import Times
     from d2rpick.choice.answers import PairVerdict
     from d2rpick.choice.pair.situation import Situation
     from d2rpick.choice.question import Reference, Settings
-    from d2rpick.deck.printed_card import PrintedCard, Printing, Times
+    from d2rpick.deck.printed_card import PrintedCard, Printing
     from d2rpick.histories.history import History
 
 
@@ -55,7 +56,8 @@ def add_deck_bodies(printing: Printing, settings: Settings) -> Printing:
 def _add_pushes(printing: Printing, history: History, solver: str) -> Printing:
     """Add the times at which the named contact or rigid wall exerts a force, and the closing speed of the parts.
 
-    The times follow from the contact force in the file, or else from the part momenta; the speed only from momenta.
+    The times follow from the contact force or, if it is not written, from the part momenta; the speed follows only from
+    momenta.
     """
     # Imported here to keep start-up fast.
     from d2rpick.flight.contact_times import (
@@ -102,8 +104,8 @@ def print_judged_card(
 ) -> tuple[PrintedCard, tuple[PairVerdict, ...]] | None:
     """Print the card for windows with the verdicts that ``judge`` returns for the printed values of tr and td.
 
-    The history completes ``printing``.  In the windows ``done`` the run is already switched: they are printed too, but
-    this run cannot show whether they are good.  The result is None if the parts, or for some solvers the main nodes,
+    The history completes ``printing``. The windows ``done``, in which the run is already switched, are printed, too,
+    but this run cannot show whether they are good. The result is None if the parts or, for some solvers, the main nodes
     are not given.
     """
     if not list_switched(printing):

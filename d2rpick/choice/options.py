@@ -74,9 +74,9 @@ class Limit(NamedTuple):
 class Use(NamedTuple):
     """Commands and answers that use an option of a choice, and the limit that the option sets.
 
-    ``limit`` is what its value limits, None if it is not a limit.  ``of_cards``: ``card`` and ``check --history`` have
-    the option too.  ``of_sets``: ``parts`` and ``study`` have it too.  ``is_advanced``: the last section of the help
-    lists it.
+    ``limit`` is the quantity that the value of the option limits; None if the option is not a limit. If ``of_cards`` is
+    True, ``card`` and ``check --history`` also have the option, and if ``of_sets`` is True, ``parts`` and ``study``
+    also have it. If ``is_advanced`` is True, the last section of the help lists the option.
     """
 
     limit: Limit | None = None
@@ -95,8 +95,8 @@ def _describe_use(**use: Any) -> dict[str, Use]:
 class ChoiceOptions:
     """The options that define how a pair is chosen and judged; times have the unit of the history.
 
-    An option that is a limit of a recommendation has a ``limit`` of a quantity: suggest, verify, explore, plan, study
-    and check then refuse a pair that exceeds it, say so, and leave it out of the windows.
+    An option that limits recommendations has a ``limit``. Suggest, verify, explore, plan, study and check then refuse
+    each pair that exceeds the limit, state this, and exclude such pairs from the windows.
     """
 
     after: float | None = make_option(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import chain
+from math import isfinite
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -26,7 +27,7 @@ from d2rpick.choice.health import (
 )
 from d2rpick.choice.pair.grades import DO_NOT_USE, USE, USE_WITH_CARE
 from d2rpick.choice.question import Reference, Settings
-from d2rpick.choice.switched.frozen import Times, find_frozen_times
+from d2rpick.choice.switched.frozen import find_frozen_times
 from d2rpick.choice.switched.switched_run import (
     find_rigid_times,
     select_model_momenta,
@@ -44,6 +45,7 @@ from d2rpick.histories.samples import compute_median
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
+    from d2rpick.base.spans import Times
     from d2rpick.histories.database import Legs
     from d2rpick.histories.history import Samples
     from d2rpick.histories.run import OpenedRun
@@ -118,7 +120,7 @@ class Overview(NamedTuple):
     @property
     def verdict(self) -> str:
         """Verdict on whether switch times can be chosen from this run: "use", "use with care" or "do not use"."""
-        if self.unjudged or not self.flights or self._is_spent:
+        if self.unjudged or not self.flights or self._is_spent or self.is_loaded:
             return DO_NOT_USE
         return USE_WITH_CARE if self._doubts else USE
 
@@ -137,12 +139,24 @@ class Overview(NamedTuple):
                 f"this is a switched run: parts are rigid from {_list_times(self.rigid)}, and no flight follows; "
                 "choose times from the reference run, and compare this one with it (d2rpick verify)"
             )
+        if self.is_loaded:
+            return (
+                "gravity or another load acts in every flight, and the files do not show which, so no pair of times "
+                "can be used"
+            )
         summary = f"{_describe_flights(self.flights)}; {_describe_health(self.health)}"
         return "; ".join(self._doubts) or summary
 
     @property
+    def is_loaded(self) -> bool:
+        """True if a load of unknown kind acts in every flight, so that ``suggest`` refuses every pair of times."""
+        return bool(self.flights) and not any(
+            isfinite(flight.gravity) for _, flight in self.flights
+        )
+
+    @property
     def _is_spent(self) -> bool:
-        """True if parts were rigid and no flight begins after they were rigid."""
+        """True if parts were rigid and no flight begins after they have become deformable again."""
         last = max((end for _, end in self.rigid), default=None)
         return last is not None and all(
             flight.start < last for _, flight in self.flights
@@ -153,6 +167,8 @@ class Overview(NamedTuple):
         """Reasons to use a run with flights only with care."""
         health = warn_about_health(self.health) if self.health else ()
         doubts = [caution.message for caution in health]
+        if doubts and not self.rigid:
+            doubts.append("d2rpick plan judges each flight only up to its td")
         if self.rigid:
             when = _list_times(self.rigid)
             doubts.insert(
@@ -468,6 +484,7 @@ def _find_flights_to_choose_from(
                 flight.parts,
                 flight.end is not None,
                 flight.damping,
+                flight.gravity if flight.unknown_load else 0.0,
             ),
         )
         for flight in flights

@@ -65,12 +65,13 @@ def read_reference(
 class Settings(ChoiceOptions):
     """The analyst's settings: the options of a choice, and the data from the deck of the run.
 
-    ``oscillator``: given instead of identified.  ``replay`` False: judge by the energy level alone.  ``min_quality``:
-    lowest grade of a pair that is planned, and that a deck passes with.  ``bodies``: rigid bodies that the parts
-    become, according to a deck; None if there is no deck, empty if it does not define them; then one body is assumed.
-    ``placement``: places of the parts according to the deck, or None.  ``by_deck``: sources of these and of a cost
-    share that is not given; None if there is no deck.  ``kept_off``: main nodes of rigid bodies that a Radioss deck
-    keeps inactive.  ``ruined``: faults of the deck that ruin its run.
+    ``oscillator`` is given by the user instead of identified. If ``replay`` is False, pairs are judged only by the
+    energy level. ``min_quality`` is the lowest grade of a pair that is planned or that a deck may contain. ``bodies``
+    are the rigid bodies that the parts become; it is None if there is no deck, and empty if the deck does not define
+    them, and one body is then assumed. ``placement`` contains the part positions according to the deck, or None.
+    ``by_deck`` names the files from which these values, and a cost share that the user did not give, were computed;
+    None if there is no deck. ``kept_off`` contains the main nodes of rigid bodies that a Radioss deck keeps inactive.
+    ``ruined`` lists faults of the deck that ruin its run.
     """
 
     min_quality: str = FAIR

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 import click
 
-from d2rpick.api.cards import Cards, collect_cautions, print_card
 from d2rpick.base.errors import INTERNAL_ERROR
 from d2rpick.cli import options
 from d2rpick.cli.options import FILES, REFERENCE, RESULT
@@ -22,6 +21,7 @@ from d2rpick.report.formats import FORMATS
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from d2rpick.api.cards import Cards
     from d2rpick.api.request import Request
 
 
@@ -64,6 +64,9 @@ def card(
     d2rpick card --tr 0.02 --td 0.09 --tr 0.2 --td 0.3 --part 11
     d2rpick card --solver radioss --tr 0.0135867 --td 0.0687534 --node 1001 --end 0.15
     """
+    # Imported here to keep the start of the other commands fast.
+    from d2rpick.api.judged_cards import collect_cautions, print_card
+
     if cards.solver:
         cards.check_solver(cards.solver)
     times = _read_windows(tr, td, windows)
@@ -199,7 +202,7 @@ def rule(id: tuple[str, ...], output: Output) -> None:  # noqa: A002  the usage 
     d2rpick rule -v D2R105
     d2rpick rule poor-td
     """
-    from d2rpick.report.findings import explain_rules, list_rules
+    from d2rpick.report.rule_texts import explain_rules, list_rules
 
     output = output.beside()
     display = output.shown()

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import click
 
-from d2rpick.api.cards import Cards, JudgedCard, collect_cautions
 from d2rpick.api.request import (
     CHOOSING,
     CHOOSING_FOR_SETS,
@@ -45,6 +44,8 @@ from d2rpick.report.formats import FORMATS, WrittenDeck, write
 
 if TYPE_CHECKING:
     from d2rpick.api.asked import RunQuestion
+    from d2rpick.api.cards import Cards
+    from d2rpick.api.judged_cards import JudgedCard
     from d2rpick.api.plans import Plan
     from d2rpick.base.errors import Caution
 
@@ -175,6 +176,9 @@ def suggest(
         answer, lambda: answer.page(options.repeat_command(), request.judging(), cards)
     )
     if card:
+        # Imported here to keep start-up fast.
+        from d2rpick.api.judged_cards import collect_cautions
+
         judged_card = answer.printed(cards)
         if judged_card is None:
             new_cautions = []
@@ -190,6 +194,13 @@ def suggest(
         times = options.write_times(td=td, td_window=td_window)
         output.answer(answer, question=question.repeated._replace(times=times))
         decision = answer.decision
+        if (
+            output.output_format == "value"
+            and decision
+            and not decision.reaches("fair")
+        ):
+            # The bare value does not contain the verdict.
+            output.notes([f"{decision.verdict} this pair: {decision.reason}"], ())
     # The best pair for a given td is shown even if it is poor; the answer and the card then say so.
     min_quality = request.min_quality or ("poor" if td is not None else "fair")
     _finish_answer(output, question, decision, min_quality)
@@ -285,7 +296,7 @@ def explore(
 )
 @options.make_file_option(
     "--switched",
-    "Compare a finished switched run with the reference: file, folder or glob; repeatable.",
+    "Compare a finished switched run with the reference run: file, folder or pattern; repeatable.",
     many=True,
 )
 @options.make_click_option(
@@ -409,8 +420,8 @@ def parts(tr: float | None, td: float | None, request: Request, output: Output) 
 )  # fmt: skip
 @options.make_file_option(
     "--done",
-    "File with the windows in which HISTORY was switched, a line 'tr td' for each, or a journal.  d2rpick plans "
-    "the later windows; -f value, -f card and --write-deck contain both.",
+    "File with the windows in which HISTORY was switched, a line 'tr td' for each, or the journal of d2rpick drive.  "
+    "d2rpick plans the later windows; -f value, -f card and --write-deck contain both.",
 )
 @options.make_file_option(
     "--before",
@@ -465,22 +476,13 @@ def plan(
     from d2rpick.api.plans import plan_for_question
 
     form = output.output_format
-    if every and form not in ("value", "card") and not write_deck:
-        raise click.UsageError(
-            "--all belongs to -f value, -f card and --write-deck; other forms hold every window"
-        )
+    _check_form(form, write_deck, every=every)
     _check_deck(request, cards, form, write_deck)
     output.check(cards, by_itself=bool(write_deck))
     with open_with_output(request, output, done, *before) as (run, output):
         question = ask_run(run, request, merge=cards.merge)
-        if write_deck and (
-            foreign := [
-                caution
-                for caution in question.cautions
-                if caution.code == "deck-of-another-model"
-            ]
-        ):
-            raise DeckError(f"{request.deck}: {foreign[0].message}")
+        if write_deck:
+            _refuse_deck_of_another_model(question, request)
         earlier = open_requested_run(request, before) if before else None
     done_windows = options.read_windows_in(done) if done else ()
     with show_computing(quiet=output.quiet):
@@ -489,35 +491,30 @@ def plan(
     output.beside_answer(
         answer, lambda: answer.page(options.repeat_command(), (), cards)
     )
-    judged_card = (
-        answer.printed(cards, every=every) if form == "card" or write_deck else None
-    )
-    checked, passed, written = ("", True, None)
-    if judged_card and write_deck:
+    judged_card = None
+    if form == "card" or write_deck:
+        judged_card = answer.printed(cards, every=every)
+    checked, written = "", None
+    if write_deck:
         checked, written = _write_and_check(judged_card, answer, write_deck, output)
-        passed = written.passed
-    elif write_deck:
-        checked = f"no deck was written to {make_printable(write_deck)}, because no window can be used"
     if checked and form != "table":
         click.echo(checked, err=True)
+    passed = written is None or written.passed
     if form == "card":
+        new_cautions = _select_new_cautions(judged_card, answer)
         passed &= output.card(
-            judged_card,
-            _select_new_cautions(judged_card, answer),
-            question.repeated,
-            request.deck,
+            judged_card, new_cautions, question.repeated, request.deck
         )
     else:
         if judged_card:
             output.notes(judged_card.card.notes, ())
             answer = replace(answer, fewest_cycles=judged_card.card.fewest_cycles)
+        times = options.write_times(min_rigid=min_rigid, done=done, before=before)
         output.answer(
             answer,
             checked if form == "table" else "",
             every=every,
-            question=question.repeated._replace(
-                times=options.write_times(min_rigid=min_rigid, done=done, before=before)
-            ),
+            question=question.repeated._replace(times=times),
             written_deck=written,
         )
         passed &= bool(answer.supported)
@@ -530,6 +527,9 @@ def _select_new_cautions(card: JudgedCard | None, plan: Plan) -> list[Caution]:
     """Return the cautions about the card that the plan lacks, e.g. those about windows without a verdict."""
     if card is None:
         return []
+    # Imported here to keep start-up fast.
+    from d2rpick.api.judged_cards import collect_cautions
+
     failed = tuple(
         verdict
         for verdict in card.verdicts
@@ -540,6 +540,21 @@ def _select_new_cautions(card: JudgedCard | None, plan: Plan) -> list[Caution]:
         for caution in collect_cautions(card._replace(verdicts=failed))
         if caution not in plan.cautions
     ]
+
+
+def _check_form(form: str, folder: str | None, *, every: bool) -> None:
+    """Refuse ``--all`` for output that contains all windows anyway."""
+    if every and form not in ("value", "card") and not folder:
+        raise click.UsageError(
+            "--all belongs to -f value, -f card and --write-deck; other forms hold every window"
+        )
+
+
+def _refuse_deck_of_another_model(question: RunQuestion, request: Request) -> None:
+    """Raise DeckError if the deck that is to be copied does not belong to the model of the run."""
+    for caution in question.cautions:
+        if caution.code == "deck-of-another-model":
+            raise DeckError(f"{request.deck}: {caution.message}")
 
 
 def _check_deck(request: Request, cards: Cards, form: str, folder: str | None) -> None:
@@ -553,19 +568,22 @@ def _check_deck(request: Request, cards: Cards, form: str, folder: str | None) -
 
 
 def _write_and_check(
-    card: JudgedCard, plan: Plan, folder: str, output: Output
-) -> tuple[str, WrittenDeck]:
+    card: JudgedCard | None, plan: Plan, folder: str, output: Output
+) -> tuple[str, WrittenDeck | None]:
     """Write the copy of the deck and check it against the history.
 
     Returns
     -------
     text : str
-        The written files, and below them the output of ``check --history`` for the deck.
-    written : WrittenDeck
-        The folder, and whether the check found something.
+        The written files, and below them the output of ``check --history`` for the deck; or why no deck was written.
+    written : WrittenDeck or None
+        The folder, and whether the check found something; None if there is no card, because no window can be used.
     """
     from d2rpick.api.plans import write_planned_deck
 
+    if card is None:
+        text = f"no deck was written to {make_printable(folder)}, because no window can be used"
+        return text, None
     names, checked = write_planned_deck(plan, card, folder, overwrite=output.overwrite)
     listed = [f"written  {make_printable(name)}" for name in names]
     written = WrittenDeck(folder, checked.passed, not checked.has_only_infos)

@@ -28,7 +28,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from d2rpick.api.answer import Answer, Paged
-    from d2rpick.api.cards import Cards, JudgedCard
+    from d2rpick.api.cards import Cards
+    from d2rpick.api.judged_cards import JudgedCard
     from d2rpick.api.request import Request
     from d2rpick.api.runs import Run
     from d2rpick.base.errors import Caution
@@ -170,10 +171,13 @@ class Output:
     def answer(self, answer: Answer, below: str = "", **display_options: Any) -> None:
         """Write an answer in the requested format."""
         now = self.shown(**display_options)
-        text = name_options_and_wrap(
-            answer.text(self.output_format, now), self.output_format, now.width
-        )
-        self.result(f"{text}\n\n{below}" if below else text)
+        text = answer.text(self.output_format, now)
+        if now.question.unused_deck and self.output_format in IN_WORDS:
+            deck = make_printable(now.question.unused_deck)
+            text = f"answer without {deck}, which is not the deck of this run\n{text}"
+        if below:
+            text = f"{text}\n\n{below}"
+        self.result(name_options_and_wrap(text, self.output_format, now.width))
 
     def beside_answer(self, answer: Paged, page: Callable[[], str]) -> None:
         """Write the figure and the page if the user requests them."""

@@ -54,7 +54,7 @@ def show_computing(*, quiet: bool, period: float = _PERIOD) -> Iterator[None]:
 
 
 class Count:
-    """Number of finished runs out of ``total``; ``taken`` of their results come from an earlier study."""
+    """Number of finished runs out of ``total``, including ``taken`` runs whose results come from an earlier study."""
 
     def __init__(self, total: int) -> None:
         self.total, self.done, self.taken = total, 0, -1

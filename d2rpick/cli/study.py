@@ -31,7 +31,7 @@ from d2rpick.report.formats import FORMATS, RepeatedQuestion
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
-    from d2rpick.api.studies import Ledger
+    from d2rpick.api.studies import Ledger, Study
     from d2rpick.base.workers import Farm
 
 
@@ -52,7 +52,7 @@ if TYPE_CHECKING:
 )  # fmt: skip
 @options.make_file_option(
     "--resume",
-    "Keep finished runs in FILE, and skip unchanged runs that it contains.",
+    "Write the answers for finished runs to FILE, and reuse them for unchanged runs.",
     kind="output",
 )
 @options.make_click_option("jobs", Option(
@@ -142,9 +142,16 @@ def study(
             times=options.write_times(td=td, td_window=td_window), files=sources
         ),
     )
+    _finish_study(answer, output)
+
+
+def _finish_study(answer: Study, output: Output) -> None:
+    """Exit with the code that the answer requires, after a message that explains the code."""
     if not answer.judged:
-        tell(f"d2rpick: no run could be judged; the first: {rows[0].message or ''}")
-    if not answer.judged or any(row.status == INTERNAL_ERROR for row in rows):
+        tell(
+            f"d2rpick: no run could be judged; the first: {answer.runs[0].message or ''}"
+        )
+    if not answer.judged or any(row.status == INTERNAL_ERROR for row in answer.runs):
         click.get_current_context().exit(2)
     if answer.is_choice_refused and not output.exit_zero:
         tell("d2rpick: exit code 1: the verdict on the common tr is 'do not use'")
@@ -264,8 +271,11 @@ def calibrate(folders: tuple[str, ...], output: Output) -> None:
     d2rpick calibrate -f toml -o site.toml sample_data/flying_box
     """
     from d2rpick.api.costs import calibrate as fit
+    from d2rpick.report.next_step import name_step_after_weights
 
     output = output.beside()
     answer = fit(folders)
     output.notes((), answer.cautions)
     output.answer(answer, question=RepeatedQuestion(files=folders))
+    if output.file and output.output_format == "toml":
+        output.next_step(name_step_after_weights(output.file))

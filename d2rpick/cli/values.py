@@ -78,7 +78,7 @@ class NumberType(FloatType):
             if param and param.nargs == _PAIR and not hint:
                 hint = ": two numbers were expected"
             if param and param.metavar == "T" and not hint:
-                hint = ", a time in the unit of the run was expected"
+                hint = ", a time in the unit of the run was expected, such as 0.005"
             self.fail(f"{value!r} is not a number{hint}", param, ctx)
         if not math.isfinite(number):
             self.fail(f"{value!r} is not a finite number", param, ctx)
@@ -179,7 +179,7 @@ class RuleIds(CompletedText):
 
     def offer(self, ctx: click.Context) -> Iterable[tuple[str, str]]:  # noqa: ARG002  other subclasses use the argument
         """Return the rules with their summaries."""
-        from d2rpick.report.findings import list_rules
+        from d2rpick.report.rule_texts import list_rules
 
         rows = (line.split(maxsplit=2) for line in list_rules().split("\n"))
         return [(rule, summary) for rule, _, summary in rows]

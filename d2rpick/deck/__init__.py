@@ -1,6 +1,6 @@
 """Read LS-DYNA decks and Radioss runs: cards with file, line and column, rigid windows, parts and elements.
 
-This page finds the main decks of a folder and reads the parts of a deck from its path.
+This module finds the main decks of a folder, and reads the parts of a deck given by its path.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ def read_inventory(path: str) -> Inventory:
 def find_time_unit(path: str) -> str:
     """Return the time unit that a Radioss deck gives for both itself and the computation; empty if they differ.
 
-    Decks of LS-DYNA name no units.
+    LS-DYNA decks contain no units.
 
     Raises
     ------
@@ -84,7 +84,7 @@ def find_main_decks(folder: str) -> list[str]:
     Raises
     ------
     DeckError
-        If there is none, with what to do.
+        If there is no main deck; the message says what to do.
     """
     decks = [path for path in _list_files(folder) if _is_main_deck(path)]
     included = {
@@ -105,8 +105,8 @@ def find_main_decks(folder: str) -> list[str]:
 def find_decks_of_run(folder: str) -> list[str]:
     """Return the paths of the main decks with parts in the folder of a run.
 
-    Restart decks and files that contain only switching cards have none. A Radioss run is represented by its starter
-    deck.
+    Restart decks and files that contain only switching cards are not main decks with parts. A Radioss run is
+    represented by its starter deck.
     """
     try:
         decks = find_main_decks(folder)
@@ -180,8 +180,8 @@ def _is_main_deck(path: str) -> bool:
 def _read_head(path: str) -> bytes:
     """Return the first bytes of a file.
 
-    A small file may just be saved, so its content is awaited. The beginning of a large file is complete, even if a
-    solver still writes to it.
+    A small file may be in the process of being saved, so its content is awaited. The beginning of a large file is
+    complete, even if a solver is still writing to the file.
     """
     from d2rpick.deck.source import SourceFile
 

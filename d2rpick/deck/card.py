@@ -1,7 +1,7 @@
 """Represent cards (keywords with data lines of fields), and the parameters (``&name``) in their fields.
 
-Numbers are evaluated on request. Each field knows its place in the file, and each parameter knows its definitions and
-where it is visible.
+Numbers are evaluated on request. Each field has its place in the file, and each parameter its definitions and the files
+in which it is visible.
 """
 
 from __future__ import annotations
@@ -78,7 +78,8 @@ Problem = tuple[CardField, str]
 class Value(Generic[T]):
     """The value of a field. If ``value`` is a default for an unreadable field, ``problem`` gives the reason.
 
-    ``place`` is the field, or the row in which it has this ``position``: most fields are never needed for a message.
+    ``place`` is the field, or the row in which the field has this ``position``; the field itself is built only for a
+    message.
     """
 
     value: T
@@ -143,7 +144,8 @@ class Row:
 class Transform(NamedTuple):
     """Effects of ``*INCLUDE_TRANSFORM`` on an included file: id offsets and a time factor.
 
-    ``scaled``: the file has another unit of mass, time or length. ``moved``: its nodes are moved.
+    ``scaled`` is True if the file has a different unit of mass, time or length. ``moved`` is True if its nodes are
+    moved.
     """
 
     node: int = 0
@@ -288,7 +290,8 @@ class Card:
 class Definition(NamedTuple):
     """One definition of a parameter.
 
-    ``problem`` is the reason why it has no value, ``order`` counts all definitions of a deck.
+    ``problem`` is the reason why the definition has no value, and ``order`` is its index among all definitions of the
+    deck.
     """
 
     name: str
@@ -417,7 +420,7 @@ class Scope:
     ) -> Definition | None:
         """Evaluate one definition of a parameter.
 
-        ``name_field`` is the type letter with the name. Return None if the type letter is another one.
+        ``name_field`` contains the type letter and the name. Return None if the type letter is not the expected one.
         """
         kind = name_field[:1].upper()
         name = name_field[1:].strip().lstrip("&").strip().lower()

@@ -21,8 +21,8 @@ WIDTH: Final = 10  # Width of a field [characters].
 class CardColumn(NamedTuple):
     """A column of a data line: its name in the solver manual, the type of its values, and its width [characters].
 
-    ``start`` is its first character, from 0.  ``position`` counts the fields of 10 characters before it: in free format
-    and in long format the line has the same fields in the same order.
+    ``start`` is the index of its first character, from 0. ``position`` is the number of fields of 10 characters before
+    it; in free format and in long format, the line has the same fields in the same order.
     """
 
     name: str
@@ -90,7 +90,9 @@ class DataLine:
         start = 0
         for column in (column for group in groups for column in group):
             name = column.name or f" {start}"
-            self._columns[name] = column._replace(start=start)
+            self._columns[name] = CardColumn(
+                column.name, column.kind, column.width, start
+            )
             start += column.width
 
     def __getitem__(self, name: str) -> CardColumn:

@@ -1,8 +1,8 @@
 """Find settings with which force-triggered switches make parts rigid in the planned windows.
 
-These are TIME1, TIME2, TIME3 and OFFSET of an LS-DYNA pair, or Tdelay of a Radioss sensor. A force switch has no times
-of its own. One wait for all windows is chosen so that, with the known contact times of a run, the resulting windows are
-as close as possible to the planned ones.
+These are TIME1, TIME2, TIME3 and OFFSET of an LS-DYNA pair, or Tdelay of a Radioss sensor. A force-triggered switch has
+no times of its own. The same waiting time applies to all windows; it is chosen so that, with the known contact times of
+a run, the resulting windows are as close as possible to the planned windows.
 """
 
 from __future__ import annotations
@@ -18,9 +18,7 @@ from d2rpick.deck.radioss_sensors import invert_spans, join_spans
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from d2rpick.deck.printed_card import Times
-
-    Spans = tuple[Times, ...]
+    from d2rpick.base.spans import Spans, Times
 
 
 _ROUNDING: Final = 1e-12  # Relative rounding error in a sum of times [-].
@@ -29,7 +27,7 @@ _ROUNDING: Final = 1e-12  # Relative rounding error in a sum of times [-].
 class Pushes(NamedTuple):
     """Time spans in which a contact force acts on the switched parts [time].
 
-    ``speed`` is that at which the parts approach the contact [length/time].
+    ``speed`` is the speed at which the parts approach the contact [length/time].
     """
 
     spans: Spans
@@ -40,7 +38,7 @@ class ForceTiming(NamedTuple):
     """Times of a force-triggered switch, and the windows in which it makes parts rigid.
 
     The switch acts between ``earliest`` and ``latest``. ``wait`` is TIME3 of the set that makes parts deformable, or
-    Tdelay. ``offset`` is a distance, 0 if the card has no offset.
+    Tdelay. ``offset`` is OFFSET [length]; 0 if the card has no offset.
     """
 
     earliest: float
@@ -92,7 +90,7 @@ def find_pair_timing(windows: Sequence[Times], pushes: Pushes) -> ForceTiming:
 def find_sensor_timing(windows: Sequence[Times], pushes: Pushes) -> ForceTiming:
     """Return the times of a Radioss force sensor; parts are deformable during each force and a waiting time after it.
 
-    Before the first window and after the last one they are deformable in any case.
+    Before the first window and after the last one, they are always deformable.
 
     Raises
     ------

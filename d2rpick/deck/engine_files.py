@@ -10,7 +10,8 @@ from d2rpick.deck.radioss_columns import RUN
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from d2rpick.deck.printed_card import Times
+    from d2rpick.base.spans import Times
+
 
 # Smallest number of time steps in a rigid window; it must be large, because parts are released up to one step late.
 # Each window has its own time-step limit, so that adding a window does not change the run before it.
@@ -62,7 +63,7 @@ def plan_legs(
 def write_bodies_off(nodes: Sequence[int]) -> Iterator[str]:
     """Yield the lines of a block that deactivates rigid bodies.
 
-    The OpenRadioss starter ignores a second such block that follows the first one directly.
+    One block contains all bodies, because the OpenRadioss starter ignores a second such block directly after the first.
     """
     if nodes:
         yield from ("/RBODY/OFF", *write_numbers(nodes))

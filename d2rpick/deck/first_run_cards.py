@@ -1,12 +1,13 @@
-"""Print the cards of a first run that switches its parts by contact forces, by which the solver detects flights.
+"""Print the cards of a first run in which the solver detects flights from contact forces, and then switches the parts.
 
-Radioss: legs that sensors end by /STOP/LSENSOR (tried with a solver; docs/reference/first-run.md).  LS-DYNA: a pair of
-switch sets with CODE 2 (no contact force) and 4 (contact force), from published text.
+For Radioss, sensors end the engine runs with /STOP/LSENSOR (tested with OpenRadioss; docs/reference/first-run.md). For
+LS-DYNA, there is a pair of switch sets with CODE 2 (no contact force) and 4 (contact force), according to published
+keyword data; this was not tested.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.errors import DeckError
 from d2rpick.deck.engine_files import EngineFile, write_engine_lines
@@ -81,17 +82,10 @@ _PUSHES, _OF_GRAVITY = ("LOAD_", "AIRBAG_"), ("LOAD_BODY", "LOAD_GRAVITY")
 _OFFSET_THICKNESSES: Final = 2
 
 
-def print_first_run_cards(
-    path: str,
-    inventory: Inventory,
-    parts: Sequence[int],
-    wait: float,
-    reason: str,
-    after: float | None,
-) -> PrintedCard:
-    """Print the cards with which the first run of a deck switches its parts after the given force-free time.
+class FirstRun(NamedTuple):
+    """A deck whose first run is to switch parts, and when it switches them.
 
-    Parameters
+    Attributes
     ----------
     path : str
         Main deck of LS-DYNA, or a file of a Radioss run with one engine file.
@@ -102,38 +96,54 @@ def print_first_run_cards(
     wait : float
         Force-free time after which a flight is detected [time].
     reason : str
-        Origin of this time.
+        Text that states where this time comes from.
     after : float or None
         No part becomes rigid before this time [time].
+    """
+
+    path: str
+    inventory: Inventory
+    parts: Sequence[int]
+    wait: float
+    reason: str
+    after: float | None
+
+    def explain_wait(self) -> str:
+        """Return the note that states how long no force must act until a flight is detected, and why."""
+        return f"force-free time that marks a flight: {self.wait:.4g}; {self.reason}"
+
+    def falls_from_rest(self, *, starts_moving: bool) -> bool:
+        """Return True if gravity acts and the parts do not start moving, so that they may be rigid from the start."""
+        has_gravity = bool(self.inventory.boundary.gravity)
+        return self.after is None and has_gravity and not starts_moving
+
+
+def print_first_run_cards(first_run: FirstRun) -> PrintedCard:
+    """Print the cards with which the first run of a deck switches its parts after the given force-free time.
 
     Returns
     -------
     PrintedCard
-        With notes for the user.
+        The cards with notes for the user.
 
     Raises
     ------
     DeckError
         If the deck has no contact that shows a flight, or if other loads than contacts and gravity act on the parts.
     """
-    if inventory.solver == "radioss":
-        return _print_radioss_cards(path, inventory, parts, wait, reason, after)
-    return _print_ls_dyna_cards(path, inventory, parts, wait, reason, after)
+    if first_run.inventory.solver == "radioss":
+        return _print_radioss_cards(first_run)
+    return _print_ls_dyna_cards(first_run)
 
 
 # The functions below write the cards for Radioss.
 
 
-def _print_radioss_cards(
-    path: str,
-    inventory: Inventory,
-    parts: Sequence[int],
-    wait: float,
-    reason: str,
-    after: float | None,
-) -> PrintedCard:
+def _print_radioss_cards(first_run: FirstRun) -> PrintedCard:
     """Print the engine files and sensors of a Radioss run; raise DeckError if the deck has no contact or rigid wall."""
-    run, bodies = read_run(path), find_bodies(path, parts)
+    path, wait = first_run.path, first_run.wait
+    run = read_run(path)
+    bodies = find_bodies(path, first_run.parts)
     if run.starter is None or len(run.legs) != 1:
         raise DeckError(
             f"{path}: the run has {len(run.legs)} engine files; its starter deck and one were expected"
@@ -142,10 +152,11 @@ def _print_radioss_cards(
         raise DeckError(f"{load.at}: /{load.name} {_UNSEEN}")
     contacts = require_forces(path, run.starter)
     (leg,) = run.legs
-    starts_moving = run.starter.named("INIVEL") or leg.starts
-    at_rest = after is None and bool(inventory.boundary.gravity) and not starts_moving
+    starts_moving = bool(run.starter.named("INIVEL") or leg.starts)
+    at_rest = first_run.falls_from_rest(starts_moving=starts_moving)
+    first_switch = max(first_run.after or 0.0, wait)
     sensors, contact, flight = write_flight_sensors(
-        contacts, wait, max(after or 0.0, wait), bodies.sensor
+        contacts, wait, first_switch, bodies.sensor
     )
     largest_step = float(f"{wait / _STEPS_PER_WAIT:.2g}")
     other_nodes = [
@@ -160,7 +171,7 @@ def _print_radioss_cards(
         if number < _MOST_LEGS - at_rest:
             lines += ["/STOP/LSENSOR", str(contact if rigid else flight), "0 0 0 0 0 0"]
         files[f"{leg.name}_{number:04d}.rad"] = "\n".join(lines) + "\n"
-    explanation = _explain_wait(wait, reason)
+    explanation = first_run.explain_wait()
     if at_rest:
         explanation = f"in free fall from rest: rigid from 0; then {explanation}"
     of_radioss = [note.format(cap=largest_step) for note in _OF_RADIOSS]
@@ -171,41 +182,30 @@ def _print_radioss_cards(
     return PrintedCard(head, (), files, tuple(notes), bodies.cards + sensors)
 
 
-def _explain_wait(wait: float, reason: str) -> str:
-    """Return the note that states how long no force must act until a flight is detected, and why."""
-    return f"force-free time that marks a flight: {wait:.4g}; {reason}"
-
-
 # The functions below write the cards for LS-DYNA.
 
 
-def _print_ls_dyna_cards(
-    path: str,
-    inventory: Inventory,
-    parts: Sequence[int],
-    wait: float,
-    reason: str,
-    after: float | None,
-) -> PrintedCard:
+def _print_ls_dyna_cards(first_run: FirstRun) -> PrintedCard:
     """Print the switch sets of an LS-DYNA run; raise DeckError unless exactly one contact can trigger the switches."""
+    path, wait, after = first_run.path, first_run.wait, first_run.after
     deck = read_deck(path)
     contact, keyword = _find_contact(path, deck)
-    part_ids = check_ids(parts)
+    part_ids = check_ids(first_run.parts)
     suiting = find_suiting(path, part_ids)
     printing = Printing(
         part=tuple(part_ids),
-        bodies=inventory.bodies(part_ids),
+        bodies=first_run.inventory.bodies(part_ids),
         swset=suiting.swset or Printing().swset,
         delete_nodal_bodies=suiting.delete_nodal_bodies,
         delete_node_sets=suiting.delete_node_sets,
     )
-    offset, offset_note = _choose_offset(inventory, keyword)
-    notes = [_explain_wait(wait, reason), *_OF_ALL, *_OF_LS_DYNA, offset_note]
+    offset, offset_note = _choose_offset(first_run.inventory, keyword)
+    notes = [first_run.explain_wait(), *_OF_ALL, *_OF_LS_DYNA, offset_note]
     if suiting.delete_nodal_bodies or suiting.delete_node_sets:
         notes.append(_DELETED)
     if after is None:
-        starts_moving = deck.named("INITIAL_VELOCITY")
-        at_rest = bool(inventory.boundary.gravity) and not starts_moving
+        starts_moving = bool(deck.named("INITIAL_VELOCITY"))
+        at_rest = first_run.falls_from_rest(starts_moving=starts_moving)
         notes.append(_AT_REST if at_rest else _OF_LOAD)
     delay = wait / _DELAYS_PER_WAIT
     lines = [f"$ {line}" for line in write_comments([*notes, *PHYSICS])]
@@ -234,9 +234,14 @@ def _find_contact(path: str, deck: Deck) -> tuple[int, str]:
     if entities.all_known and len(contacts) == 1:
         return contacts[0].id or contacts[0].number, contacts[0].keyword
     count = len(contacts) if entities.all_known else "unknown"
+    if count == 0:
+        cure = "add one between the parts and what they hit, such as *CONTACT_AUTOMATIC_SURFACE_TO_SURFACE"
+    else:
+        cure = "keep one of them"
     raise DeckError(
         f"{path}: {count} contacts between surfaces, or of nodes with a surface; one was expected: a switch waits for"
-        " one, and single-surface contacts never trigger it"
+        f" one, and single-surface contacts never trigger it; {cure}, or compute a reference run and"
+        " choose the times from it (d2rpick plan)"
     )
 
 

@@ -2,7 +2,7 @@
 
 Source: the vendor's keyword data as published in its Python library. A set switches between TIME1 and TIME2 when the
 force of its contact or wall is zero (CODE 1, 2) or not zero (CODE 3, 4). The sets of a pair act in turn, beginning with
-the one that has PAIRED 1. No set acts within TIME3 after the last switch. Not tried with the solver.
+the one that has PAIRED 1. No set acts within TIME3 after the last switch. This was not tested with the solver.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 class ForceSwitch(NamedTuple):
     """A switch set that waits until a force acts (``with_force`` is True) or until no force acts.
 
-    The set acts between ``earliest`` and ``latest`` [time]. ``delay`` is TIME3. ``paired``: the set and its pair act in
-    turn.
+    The set acts between ``earliest`` and ``latest`` [time]. ``delay`` is TIME3. ``paired`` is True if the set and its
+    counterpart act in turn.
     """
 
     to_rigid: bool
@@ -50,8 +50,8 @@ def follow_pair(
     end : float
         End of the run [time].
     second_contacts : sequence of (float, float), optional
-        Contacts as the second set sees them: it may wait for the force of another contact, or act before the contact
-        because of its OFFSET.  Default: ``contacts``.
+        Contacts for the second set, which may wait for the force of another contact, or act before the contact because
+        of its OFFSET. The default is ``contacts``.
 
     Returns
     -------
@@ -113,7 +113,7 @@ def find_delay_without_chatter(
 ) -> float | None:
     """Return the smallest TIME3 of the releasing set with which the pair switches only in these windows.
 
-    Each contact before a window must be over within this time; None if no contact precedes any window.
+    Each contact before a window must end within this time. The result is None if no contact precedes any window.
     """
     contacts_before = [
         [span for span in contacts if span[1] <= tr] for tr, _ in windows

@@ -1,7 +1,7 @@
 """Map formulation numbers of elements to formulation names and to the classes that determine the element cost.
 
-Measured classes: QBAT, QEPH and BT shells, beams, solids and springs (weights in `d2rpick.choice.parts.cost`).
-A formulation that was not measured has the class of a similar one, with ``measured`` False.
+The costs of the following classes were measured: QBAT, QEPH and BT shells, beams, solids and springs (weights in
+`d2rpick.choice.parts.cost`). Any other formulation has the class of a similar formulation, and ``measured`` is False.
 """
 
 from __future__ import annotations

@@ -3,8 +3,8 @@
 The time step is the time in which a wave crosses an element, before any factor of the solver: L/c with c^2 = E/rho for
 beams, E/(rho (1 - nu^2)) for shells and E (1 - nu)/(rho (1 + nu)(1 - 2 nu)) for solids. L is the length of a beam, the
 area of a shell over its longest side (twice that for a triangle), or the volume of a solid over its largest face (three
-times that for a tetrahedron). Solvers add mass, scale the time step or use a nodal time step, so the real one may
-differ by some 10 %.
+times that for a tetrahedron). Solvers add mass, scale the time step or use a nodal time step, so the actual time step
+may differ by about 10 %.
 
 The mass of a part is distributed evenly over the volume of its elements. Each element is a point mass at the mean of
 its nodes.
@@ -56,7 +56,8 @@ def compute_masses_and_steps(
 ) -> dict[int, tuple[float | None, float | None]]:
     """Return the mass [mass] and the smallest stable time step [time] of every part with elements, keyed by part id.
 
-    None if the deck does not define the density, modulus, thickness or position of every element of the part.
+    A value is None if the deck does not define the density, modulus, thickness or position of every element of the
+    part.
     """
     measured: dict[int, list[_ElementTotals]] = {}
     for elements in inventory.elements:
@@ -243,8 +244,9 @@ def _compute_tetrahedron_volumes(
 class PartPosition(NamedTuple):
     """Position, inertia and watched nodes of a part according to the deck.
 
-    ``centre`` (3,) is that of its mass [length], ``spread`` (3, 3) are its second moments divided by its mass
-    [length^2]. ``watched`` maps the places of its nodes with written motion (in the node table) to their coordinates.
+    ``centre`` (3,) is the centre of mass [length], and ``spread`` (3, 3) contains the second moments divided by the
+    mass [length^2]. ``watched`` contains the coordinates of the nodes whose motion is written, keyed by their index in
+    the node table.
     """
 
     centre: Reals
@@ -270,7 +272,7 @@ class Placement:
     def parts(self) -> Mapping[int, PartPosition]:
         """Return the position of each part whose coordinates are known.
 
-        Empty if elements may be missing or the deck moves nodes.
+        The result is empty if elements may be missing or if the deck moves nodes.
         """
         if self._inventory.moved or not self._inventory.complete:
             return {}
@@ -303,7 +305,7 @@ class Placement:
     def find_watched_nodes(self, parts: Iterable[int]) -> dict[int, Reals]:
         """Return the positions (3,) of the watched nodes of the given parts [length], keyed by node number.
 
-        Nodes whose motion is written in local axes are left out.
+        Nodes whose motion is written in local axes are omitted.
         """
         inventory = self._inventory
         numbers = dict(

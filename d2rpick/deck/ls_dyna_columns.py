@@ -1,7 +1,7 @@
 """Declare the data lines of the LS-DYNA keywords that d2rpick reads or writes.
 
-Names and order: the vendor's keyword data as published in its Python library.  Columns after the last one that is read
-are left out.
+The names and their order come from the vendor's keyword data as published in its Python library. Columns after the last
+one that is read are omitted.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Read the parts and elements of an LS-DYNA deck.
 
-Columns: the vendor's keyword data as published in its Python library.
+The columns come from the vendor's keyword data as published in its Python library.
 """
 
 from __future__ import annotations
@@ -207,7 +207,7 @@ def find_shared_nodes(
     cards : sequence of Card
         The *ELEMENT cards that are read.
     bodies : mapping
-        Body of every part in question; parts of one body may share nodes.
+        Body of every part that is examined; parts of the same body may share nodes.
 
     Returns
     -------
@@ -266,7 +266,8 @@ def _list_nodes(
 def _read_watched_nodes(deck: Deck, *, local: bool) -> Integers:
     """Return the node ids on a *DATABASE_HISTORY_NODE card: eight per line, or one per line if it has a title.
 
-    If ``local`` is True, return only nodes whose motion is written in a local coordinate system, else only others.
+    If ``local`` is True, only nodes whose motion is written in a local coordinate system are returned, otherwise only
+    the others.
     """
     ids = [np.empty(0, np.int64)]
     for card in deck.named("DATABASE_HISTORY_NODE"):
@@ -343,7 +344,7 @@ def _read_elements(
 ) -> Iterator[tuple[str, Integers, Integers]]:
     """Yield the kind, part ids and node ids of a card's elements block by block, with the id offsets of the include.
 
-    ``node_count`` is the number of nodes of each element; default: those that define its size.
+    ``node_count`` is the number of nodes of each element; the default is the number of nodes that define its size.
     """
     kind = _KINDS[card.name.split("_")[1]]
     width = _get_id_width(card)
@@ -381,7 +382,7 @@ def _read_elements(
 def _join_lines(values: Integers) -> tuple[Integers, Integers | None]:
     """Join each line with element and part ids to the line of node ids below it.
 
-    Return also a last line whose nodes are missing.
+    A last line whose nodes are missing is returned, too.
     """
     heads = (values[:, :2] > 0).all(axis=1) & (values[:, 2:] == 0).all(axis=1)
     if not heads.any():

@@ -1,10 +1,11 @@
 """Read supports, prescribed motions, gravity and joints from an LS-DYNA deck.
 
 Joints connect parts that share no nodes: welds, nodal rigid bodies, extra nodes and ties. While a part is rigid, such a
-constraint on it must be deleted, as a node cannot obey two (the vendor's keyword data for NRBF and NCSF of the
-switching cards). The parts that it connects then separate, unless they are one rigid body.
+constraint on it must be deleted, because a node cannot obey two constraints (vendor's keyword data for NRBF and NCSF of
+the switching cards). The parts that the constraint connects then separate, unless they are one rigid body.
 
-Columns: the vendor's keyword data as published in its Python library, and Altair's public help on these keywords.
+The columns come from the vendor's keyword data as published in its Python library, and from Altair's public help on
+these keywords.
 """
 
 from __future__ import annotations
@@ -96,7 +97,7 @@ def read_ls_dyna_boundary(
 ) -> Boundary:
     """Return the supports, prescribed motions and gravity in a deck.
 
-    ``nodes`` holds ids, coordinates and codes of fixed translations.
+    ``nodes`` contains the ids, the coordinates and the codes of fixed translations of the nodes.
     """
     numbers, coordinates, codes = nodes
     holds = [
@@ -293,7 +294,7 @@ def _read_motion(
 def _read_gravity(deck: Deck, parts: DeckParts) -> Iterator[Gravity | str]:
     """Yield the body loads, which act against their axis, or notes on loads that cannot be read.
 
-    *LOAD_BODY_PARTS restricts all of them to some parts.
+    *LOAD_BODY_PARTS restricts all body loads to some parts.
     """
     curves = dict(_read_curves(deck)) if deck.named("LOAD_BODY", "LOAD_GRAVITY") else {}
     limits = [_read_loaded_parts(card, parts) for card in deck.named("LOAD_BODY_PARTS")]
@@ -332,7 +333,7 @@ def _read_body_load(
 ) -> Gravity | None:
     """Return the accelerations on a *LOAD_BODY card.
 
-    Empty if it acts in dynamic relaxation alone, None if they are unknown.
+    The result is empty if the load acts only in dynamic relaxation, and None if the accelerations are unknown.
     """
     curve, relaxing, system = (
         card.integer(row, BODY_LOAD[name]) for name in ("LCID", "LCIDDR", "CID")

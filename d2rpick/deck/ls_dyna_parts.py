@@ -1,6 +1,6 @@
 """Read the data of an LS-DYNA deck to which switching cards refer: parts, sections, sets, materials and constraints.
 
-Columns: the vendor's keyword data as published in its Python library.
+The columns come from the vendor's keyword data as published in its Python library.
 """
 
 from __future__ import annotations
@@ -112,12 +112,23 @@ _ABLE: Final = (
 )
 # A contact or wall without an id has at most this number of lines; more lines may define a second one.
 _MOST_ROWS: Final = 8
+# Flags of a switching card that delete each kind of constraint (vendor keyword data).
+# No source states which flag deletes extra nodes and joints, so both are listed.
+DELETING_FLAGS: Final[Mapping[Kind, tuple[str, ...]]] = {
+    "nodal rigid body": ("NRBF",),
+    "generalized weld": ("NRBF",),
+    "spotweld": ("NCSF",),
+    "rivet": ("NCSF",),
+    "constrained node set": ("NCSF",),
+    "extra nodes": ("NRBF", "NCSF"),
+    "joint": ("NRBF", "NCSF"),
+}
 
 
 class DeckPartSet(NamedTuple):
     """Members of a part set: parts, ranges of part ids, and other part sets.
 
-    ``problems`` are fields that cannot be read; with one of them the members are unknown.
+    ``problems`` contains fields that cannot be read; if there are any, the members are unknown.
     """
 
     parts: tuple[int, ...] = ()
@@ -140,7 +151,7 @@ class DeckParts:
     """Data of each part, and part sets, by id; None stands for a kind of set that cannot be read.
 
     ``all_known`` is False if an include was not read, a block is encrypted, or a keyword creates parts in a way that
-    cannot be read: a part that is missing here may then exist. ``problems`` are unreadable ids of parts and sets, and
+    cannot be read; the deck may then have further parts. ``problems`` contains unreadable ids of parts and sets, and
     unreadable numbers of includes.
     """
 
@@ -359,7 +370,8 @@ def _read_listed_ids(card: Card, options: Collection[str]) -> list[Value[int]]:
 class SectionCard(NamedTuple):
     """A *SECTION card: its element kind and its ELFORM.
 
-    ``first`` is the first number of its second line, ``layers`` the number of integration points through the thickness.
+    ``first`` is the first number of its second line, and ``layers`` the number of integration points through the
+    thickness.
     """
 
     kind: str
@@ -558,19 +570,6 @@ _CONSTRAINTS: Final[
     "rivet": ("CONSTRAINED_RIVET", _read_node_pairs),
     "generalized weld": ("CONSTRAINED_GENERALIZED_WELD", _read_constrained_set),
     "constrained node set": ("CONSTRAINED_NODE_SET", _read_constrained_set),
-}
-
-
-# Flags of a switching card that delete each kind of constraint (vendor keyword data).
-# No source states which flag deletes extra nodes and joints, so both are listed.
-DELETING_FLAGS: Final[Mapping[Kind, tuple[str, ...]]] = {
-    "nodal rigid body": ("NRBF",),
-    "generalized weld": ("NRBF",),
-    "spotweld": ("NCSF",),
-    "rivet": ("NCSF",),
-    "constrained node set": ("NCSF",),
-    "extra nodes": ("NRBF", "NCSF"),
-    "joint": ("NRBF", "NCSF"),
 }
 
 

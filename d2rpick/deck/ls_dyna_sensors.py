@@ -1,10 +1,11 @@
 """Find when LS-DYNA sensors switch parts, for *SENSOR_CONTROL of type DEF2RIG and switch sets with CODE 5.
 
-A control is on or off. Its switches act in turn: when the condition of one is met, the control changes, and the next
-switch is evaluated. A switch compares the time, or the force of a contact or rigid wall, with its VALUE.
+A control is on or off. Its switches act in turn: when the condition of a switch is met, the control changes its state,
+and the next switch is evaluated. A switch compares the time, or the force of a contact or rigid wall, with its VALUE.
 
-Source: the vendor's keyword data as published in its Python library. That a set makes its parts rigid while its control
-is on, and deformable while it is off, follows from the description of CODE 5 there. Not tried with the solver.
+Source: the vendor's keyword data as published in its Python library. According to its description of CODE 5, a set
+makes its parts rigid while its control is on, and deformable while the control is off. This was not tested with the
+solver.
 """
 
 from __future__ import annotations
@@ -24,11 +25,11 @@ from d2rpick.deck.radioss_sensors import invert_spans
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
+    from d2rpick.base.spans import Spans
     from d2rpick.deck.card import Card, Row
     from d2rpick.deck.columns import CardColumn
     from d2rpick.deck.reader import Deck
 
-    Spans = tuple[tuple[float, float], ...]  # Start and end of each time span [time].
     # A function that returns the time spans in which the force of a contact or wall exceeds a value; None if unknown.
     Forces = Callable[[str, int, float], Spans | None]
 
@@ -41,8 +42,8 @@ _ALWAYS: Final = ((0.0, math.inf),)
 class Control(NamedTuple):
     """A *SENSOR_CONTROL for a switch set, with the ids of its *SENSOR_SWITCH cards in the order of their use.
 
-    ``initial`` is its state at the start, ON or OFF. ``rounds`` is how often all switches act in turn; it may be
-    infinite.
+    ``initial`` is its initial state, ON or OFF. ``rounds`` is the number of times that all switches act in turn; it may
+    be infinite.
     """
 
     card: Card
@@ -93,7 +94,8 @@ def follow_control(
     control : Control
         The control to follow.
     forces : callable or None
-        Returns the spans in which the force of a contact or wall is above a value; None if there is no history.
+        Function that returns the time spans in which the force of a contact or wall exceeds a value; None if there is
+        no history.
     end : float
         End of the run [time].
 

@@ -1,7 +1,8 @@
 """Read meshes: arrays of numbers from many lines at a time, and the elements and nodes that they define.
 
 A mesh of millions of lines is read in pieces. Lines with commas and fields with parameters are rare in a mesh and are
-read one by one. Columns of Radioss: Altair's public help for the elements, and the solver's published source.
+read one by one. The Radioss columns come from Altair's public help for the elements, and from the solver's published
+source.
 """
 
 from __future__ import annotations
@@ -52,7 +53,7 @@ NOT_COUNTED: Final = {"SPHCEL", "XELEM"}
 class Lines:
     """The data lines in a block of mesh lines, without comments and blank lines.
 
-    ``in_columns``: all lines have fixed columns.
+    ``in_columns`` is True if all lines have fixed columns.
     """
 
     def __init__(self, data: bytes, scope: Scope, comments: bytes) -> None:
@@ -72,7 +73,7 @@ class Lines:
     def integers(self, fields: Layout) -> Integers:
         """Return the ids in these fields of all lines, shape (lines, fields).
 
-        0 for a blank, `NOTHING` for text that is not an id.
+        A blank field gives 0, and text that is not an id gives `NOTHING`.
         """
         columns = [self._field(*field) for field in fields]
         if len(self) < _FEW and len({width for _, width in fields}) == 1:
@@ -92,7 +93,7 @@ class Lines:
     def reals(self, fields: Layout, wanted: slice) -> Reals:
         """Return the numbers in the fields ``wanted`` of all lines, shape (lines, wanted).
 
-        0 for a blank, NaN for text that is not a number.
+        A blank field gives 0, and text that is not a number gives NaN.
         """
         numbers = np.stack(
             [_parse_reals(self._field(*field)) for field in fields[wanted]], axis=1
@@ -232,7 +233,7 @@ def _find_used_ids(wanted: Sequence[Places]) -> Places:
 class NodeTable:
     """The nodes of a mesh by index: first the nodes with coordinates, then the nodes that occur only in elements.
 
-    ``ids`` are the node ids by place, shape (nodes,).
+    ``ids`` (nodes,) contains the node id at each index.
 
     Examples
     --------
@@ -282,7 +283,7 @@ class Elements(NamedTuple):
 class Mesh(NamedTuple):
     """Elements of a deck by kind, with their node table and the coordinates of the nodes.
 
-    ``lost`` is the number of nodes of elements that have no coordinates.
+    ``lost`` is the number of element nodes without coordinates.
     """
 
     elements: tuple[Elements, ...]
@@ -337,7 +338,7 @@ class Mesh(NamedTuple):
     def doubts(self, parts: Collection[int], sign: str) -> Iterator[str]:
         """Yield notes on elements of undefined parts, and on nodes without coordinates.
 
-        ``sign`` begins the keywords.
+        ``sign`` is the character with which keywords begin.
         """
         if unknown := sorted(self.kinds.keys() - parts):
             yield f"elements of {name_units(unknown)}, which no {sign}PART of the deck defines"
@@ -375,7 +376,7 @@ def read_elements(
 ) -> Iterator[tuple[str, Integers, Integers]]:
     """Yield kind, part ids and node ids of the elements on a card; a missing node has the id 0.
 
-    With ``damaged`` also yield elements whose ids are incomplete.
+    If ``damaged`` is True, elements with incomplete ids are yielded, too.
     """
     kind = KINDS[card.words[0]]
     fields = make_radioss_element_line(max(kind.lines)).layout

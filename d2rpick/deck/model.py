@@ -1,6 +1,6 @@
 """Represent the contents of a deck: elements by kind and formulation, materials, shared nodes, supports and joints.
 
-Arrays of elements hold the places of nodes in the node table, not node ids; -1 stands for a missing node.
+Element arrays contain the indices of nodes in the node table instead of node ids; -1 stands for a missing node.
 """
 
 from __future__ import annotations
@@ -40,9 +40,9 @@ _NO_FORMULATIONS: Final[Mapping[str, Formulation]] = {}
 class Hold(NamedTuple):
     """A support or a prescribed motion: its name, and the nodes and parts held from ``start`` to ``end`` [time].
 
-    ``nodes`` are node ids, or places once it is `placed`. ``parts`` are held as a whole. ``axes`` are the fixed global
-    directions of translation; empty if only rotations are fixed. ``counts``: it holds the part whatever the axes are,
-    as it prescribes a motion or fixes local axes.
+    ``nodes`` are node ids, or node indices after a call of `placed`. ``parts`` are held as a whole. ``axes`` are the
+    fixed global directions of translation; empty if only rotations are fixed. ``counts`` is True if it holds the part
+    regardless of the axes, because it prescribes a motion or fixes local axes.
     """
 
     name: str
@@ -57,8 +57,8 @@ class Hold(NamedTuple):
 class Gravity(NamedTuple):
     """Gravity along a global ``axis`` (None: a local axis), with the ``values`` at which its load curve is constant.
 
-    ``values`` are accelerations [length/time^2]. It acts on ``nodes`` (ids, or places) and ``parts``; None: on all
-    nodes.
+    ``values`` are accelerations [length/time^2]. Gravity acts on ``nodes`` (ids or indices) and ``parts``; if they are
+    None, it acts on all nodes.
     """
 
     axis: int | None
@@ -78,7 +78,7 @@ class Joint(NamedTuple):
 class Joints(NamedTuple):
     """Joints between known parts (``found``), and the names of ties whose parts are unknown.
 
-    ``switched`` are rigid bodies that exist to be switched.
+    ``switched`` contains the rigid bodies that the deck defines in order to switch them.
     """
 
     found: tuple[Joint, ...]
@@ -89,7 +89,7 @@ class Joints(NamedTuple):
 class Boundary(NamedTuple):
     """Supports, prescribed motions and gravity of a deck; ``gravity`` is None if it is unknown.
 
-    ``notes`` name the cards that cannot be read.
+    ``notes`` lists the cards that cannot be read.
     """
 
     holds: tuple[Hold, ...] = ()
@@ -142,7 +142,7 @@ def make_ids(numbers: Iterable[int]) -> Places:
 def find_plateaus(ordinates: Sequence[float], scale: float) -> tuple[float, ...]:
     """Return the values that a curve keeps between two successive points, multiplied by ``scale``.
 
-    Empty if it is never constant.
+    The result is empty if the curve is never constant.
 
     Examples
     --------
@@ -163,8 +163,9 @@ def find_plateaus(ordinates: Sequence[float], scale: float) -> tuple[float, ...]
 class Formulation(NamedTuple):
     """Formulation of the elements of a part: its name, and the class that determines the cost per element.
 
-    ``cost`` is a key of the weights, or None if it is unknown. ``measured``: the weight was measured for this
-    formulation, not for a similar one. ``in_plane`` is the number of integration points in each layer of a shell.
+    ``cost`` is a key of the weights, or None if it is unknown. ``measured`` is True if the weight was measured for this
+    formulation rather than for a similar one. ``in_plane`` is the number of integration points in each layer of a
+    shell.
     """
 
     name: str
@@ -192,9 +193,9 @@ class Material(NamedTuple):
 class Section(NamedTuple):
     """Section of a part: formulation of each element kind, shell thickness, beam area, spring properties.
 
-    ``turns`` is False if the stresses of its solids do not rotate with a rigid body. ``damped`` is None if it is
-    unknown. ``mass`` and ``stiffness`` are those of one spring; the stiffness is None if it is not constant. ``layers``
-    is the number of integration points through the shell thickness.
+    ``turns`` is False if the stresses of its solids do not rotate with a rigid body. ``damped`` is True if its springs
+    have damping; None if this is unknown. ``mass`` and ``stiffness`` are those of one spring; the stiffness is None if
+    it is not constant. ``layers`` is the number of integration points through the shell thickness.
     """
 
     formulations: Mapping[str, Formulation] = _NO_FORMULATIONS
@@ -226,16 +227,16 @@ class Inventory:
     coordinates : array
         Shape (nodes, 3), NaN for a node without coordinates [length].
     notes : tuple of str
-        Cards that cannot be read, and a card that already switches parts; ``complete`` is False if elements or parts
-        may be missing.
+        Messages about cards that cannot be read, and about a card that already switches parts; ``complete`` is False if
+        elements or parts may be missing.
     joints, switched : tuple of Joint
-        Connections of parts that share no nodes, and rigid bodies that exist to be switched.
+        Connections between parts that share no nodes, and rigid bodies that the deck defines in order to switch them.
     ties : tuple of str
         Connections between unknown parts.
     watched, watched_ids : array
-        Places of the nodes whose motion the run writes, and their numbers in the deck, both of shape (k,).
+        Indices of the nodes whose motion the run writes, and their ids in the deck, both of shape (k,).
     local_ids : frozenset of int
-        Numbers of the nodes whose motion is written in local axes, which may turn.
+        Ids of the nodes whose motion is written in local axes, which may rotate.
     moved : bool
         True if the deck moves nodes away from their coordinates.
     files : tuple of SourceFile
@@ -243,13 +244,13 @@ class Inventory:
     history_groups : frozenset of int
         Ids of /THPART: element groups that a time history lists among its parts.
     kept_off : tuple of int
-        Main nodes of rigid bodies that a Radioss run keeps off.
+        Main nodes of rigid bodies that a Radioss run keeps inactive.
     flaws : tuple of Flaw
-        What makes a run with rigid bodies useless.
+        Faults that ruin a run with rigid bodies.
     boundary : Boundary
         Supports, prescribed motions and gravity.
     left_rigid : LeftRigid, optional
-        Bodies that stay rigid in a run that switches others.
+        Bodies that remain rigid in a run that switches others.
     """
 
     solver: str
@@ -298,7 +299,7 @@ class Inventory:
     def further_points(self, part: int, kind: str) -> int:
         """Return the number of integration points of a shell element in all layers except the first.
 
-        0 for other elements.
+        The result is 0 for other elements.
         """
         data = self.parts.get(part)
         if data is None or data.section.layers is None:

@@ -1,7 +1,7 @@
 """Find connected pieces of a mesh, the supports of each part, and the longest period of masses on springs.
 
 A part may consist of several pieces, such as four wheels. A support holds all pieces that are connected to its nodes. A
-symmetry plane does not hold the model: model and mirror image fly together like one body.
+symmetry plane does not hold the model, because the model and its mirror image fly together like one body.
 """
 
 from __future__ import annotations
@@ -54,7 +54,8 @@ def count_pieces(
 ) -> int:
     """Return the number of disconnected mesh pieces of the given parts; 0 if there are no elements.
 
-    ``among`` are the parts that may connect them, by default the parts themselves. Joints and springs always connect.
+    ``among`` contains the parts that may connect the pieces, by default the given parts. Joints and springs always
+    connect pieces.
     """
     labels = label_pieces(inventory, frozenset(parts if among is None else among))
     nodes = [inventory.nodes_by_part.get(part, np.empty(0, np.int64)) for part in parts]
@@ -66,7 +67,7 @@ def label_pieces(
 ) -> Places:
     """Return the number of the connected piece to which each node of the deck belongs, shape (nodes,). It is cached.
 
-    Elements of ``parts``, joints and, unless ``springs`` is False, springs connect nodes.
+    Nodes are connected by elements of ``parts``, by joints and, unless ``springs`` is False, by springs.
     """
     labels_by_parts = _LABELS.setdefault(inventory, {})
     if (parts, springs) not in labels_by_parts:
@@ -120,8 +121,8 @@ def find_supports(
 ) -> tuple[Mapping[int, tuple[Hold, ...]], tuple[Hold, ...]]:
     """Return the supports of each supported part by part id, and the supports of the model.
 
-    A completely fixed piece is an obstacle: it is supported itself, but does not support a piece that it is not
-    connected to.
+    A completely fixed piece is an obstacle: it is supported, but it does not support other pieces that are not
+    connected to it.
     """
     holds = inventory.boundary.holds
     if not holds:
@@ -271,8 +272,8 @@ class _Spring(NamedTuple):
 def find_inner_period(inventory: Inventory) -> InnerPeriod | None:
     """Return the longest period in which the parts of a deck oscillate on springs relative to each other.
 
-    None if no springs connect them, or a mass or stiffness is unknown: springs must be linear along their length
-    (Radioss: /PROP/SPRING without functions).
+    The result is None if no springs connect the parts, or if a mass or stiffness is unknown. Springs must be linear
+    along their length (in Radioss, /PROP/SPRING without functions).
     """
     stiff_parts = frozenset(
         part

@@ -14,8 +14,8 @@ from d2rpick.base.errors import DeckError, make_printable
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
-Times = tuple[float, float]
-"""A rigid window (tr, td) [time of the model]."""
+    from d2rpick.base.spans import Times
+
 
 WIDTH = 10  # Width of a field [characters].
 # Largest number of characters of a number; a space separates it from the next field.
@@ -40,7 +40,7 @@ class Printing(NamedTuple):
     Attributes
     ----------
     solver : str, optional
-        A key of `SOLVERS`; if it is missing, the card is for the solver that wrote the history, by default LS-DYNA.
+        A key of `SOLVERS`; the default is the solver that wrote the history or, if this is unknown, LS-DYNA.
     part : tuple of int
         Ids of the parts to switch.
     node : tuple of int
@@ -48,9 +48,9 @@ class Printing(NamedTuple):
     off : tuple of int
         Main nodes of further rigid bodies, which stay inactive in all engine runs.
     merge : int, optional
-        Lead part into which all others are merged; if it is missing, each part becomes a separate rigid body.
+        Lead part into which all others are merged; if it is None, each part becomes a separate rigid body.
     bodies : tuple of tuple of int, optional
-        Parts of each rigid body; if ``merge`` is missing, they are merged into the first part of their body.
+        Parts of each rigid body; if ``merge`` is None, they are merged into the first part of their body.
     swset : pair of int
         Ids of the two switch sets of the first window; further windows use the ids above the larger one.
     step_cap : float, optional
@@ -60,9 +60,9 @@ class Printing(NamedTuple):
     name : str
         Name of the run.
     starter : str
-        Cards that the starter deck of the run lacks.
+        Cards to be added to the starter deck of the run.
     sensor : int
-        First id of sensors, if sensors switch.
+        Id of the first sensor, if sensors switch the bodies.
     contact, wall : int, optional
         Id of the contact, or of the rigid wall, whose force switches.
     pushed : tuple of (float, float)
@@ -70,8 +70,8 @@ class Printing(NamedTuple):
     speed : float, optional
         Speed at which the parts approach the contact [length/time].
     delete_nodal_bodies, delete_node_sets : bool
-        LS-DYNA: delete nodal rigid bodies and generalized welds (NRBF), or other constraints (NCSF), while the parts
-        are rigid.
+        For LS-DYNA, delete nodal rigid bodies and generalized welds (NRBF), or other constraints (NCSF), while the
+        parts are rigid.
     replaced : tuple of int
         Main nodes of the bodies that new bodies replace.
     """
@@ -103,7 +103,8 @@ class PrintedCard:
 
     ``windows`` are the times as printed, ``notes`` report times that differ from the given times. ``starter`` are cards
     for the starter deck, before its ``/END``. ``sensors`` are the ids of the sensors that switch bodies, by main node.
-    ``fewest_cycles`` are those of a run whose largest time step holds throughout, as with sensors; else None.
+    ``fewest_cycles`` is the smallest number of cycles of a run whose time-step limit applies throughout, as with
+    sensors; otherwise None.
     """
 
     text: str
@@ -123,9 +124,9 @@ class PrintedCard:
 class CardSolver(NamedTuple):
     """A solver whose input d2rpick can print.
 
-    ``title`` is its name, ``histories`` are the formats that only this solver writes. ``switches`` is the field of
-    `Printing` that lists what it switches (parts or main nodes), ``takes`` are the further fields that it uses.
-    ``cards`` prints consecutive windows, with remarks as comments.
+    ``title`` is its name, and ``histories`` contains the formats that only this solver writes. ``switches`` is the
+    field of `Printing` that lists what the solver switches (parts or main nodes), and ``takes`` contains the further
+    fields that it uses. ``cards`` prints consecutive windows, with remarks as comments.
     """
 
     title: str
@@ -138,7 +139,7 @@ class CardSolver(NamedTuple):
 def write_number(value: float, width: int = LONGEST) -> str:
     """Return the shortest text of at most ``width`` characters that the solver reads back as the number.
 
-    If there is none, return the text that reads back as the nearest number.
+    If there is no such text, the text that reads back as the nearest number is returned.
 
     Examples
     --------

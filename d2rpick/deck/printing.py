@@ -1,7 +1,7 @@
 """Print rigid windows as solver input: one function per solver, and a table of the solvers.
 
-LS-DYNA: a pair of *DEFORMABLE_TO_RIGID_AUTOMATIC cards for each window. Radioss: engine files that end at the switching
-times, with /RBODY/ON and /RBODY/OFF, or time sensors that switch within one engine run.
+For LS-DYNA, there is a pair of *DEFORMABLE_TO_RIGID_AUTOMATIC cards for each window. For Radioss, there are engine
+files that end at the switching times, with /RBODY/ON and /RBODY/OFF, or time sensors that switch within one engine run.
 """
 
 from __future__ import annotations
@@ -45,8 +45,9 @@ from d2rpick.deck.switch_sets import (
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
+    from d2rpick.base.spans import Times
     from d2rpick.deck.contact_timing import Pushes
-    from d2rpick.deck.printed_card import Printing, Times
+    from d2rpick.deck.printed_card import Printing
 
 _FILE: Final = "switches.k"
 
@@ -161,12 +162,12 @@ def _print_ls_dyna_contact(
 ) -> PrintedCard:
     """Print a pair of sets that switch by the force of a contact (CODE 2 and 4) or a rigid wall (CODE 1 and 3).
 
-    The windows of the card are those in which the pair switches in the history.
+    The windows of the card are those in which the pair makes the parts rigid according to the history.
 
     Raises
     ------
     DeckError
-        As `_ls_dyna`, and if no TIME3 gives as many windows as planned.
+        In the cases of `_print_ls_dyna`, and if no TIME3 gives as many windows as planned.
     """
     # Imported here to keep start-up fast.
     from d2rpick.deck.contact_timing import find_pair_timing
@@ -299,12 +300,12 @@ def _print_radioss_sensors(
 ) -> PrintedCard:
     """Print time sensors that switch the bodies with these main nodes, and one engine file for the whole run.
 
-    The time-step limit applies to the whole run, so it is the least of the limits of the windows.
+    The time-step limit applies to the whole run, so it is the smallest limit of all windows.
 
     Raises
     ------
     DeckError
-        As `_radioss` does.
+        In the cases of `_print_radioss`.
     """
     # Imported here to keep start-up fast.
     from d2rpick.deck.radioss_sensors import invert_spans
@@ -323,12 +324,12 @@ def _print_radioss_contact(
 ) -> PrintedCard:
     """Print a force sensor of a contact or rigid wall that makes the bodies deformable during contacts.
 
-    The windows of the card are those in which the sensor switches in the history.
+    The windows of the card are those in which the sensor makes the parts rigid according to the history.
 
     Raises
     ------
     DeckError
-        As `_radioss`, and if no Tdelay gives as many windows as planned.
+        In the cases of `_print_radioss`, and if no Tdelay gives as many windows as planned.
     """
     from d2rpick.deck.contact_timing import find_sensor_timing
 
@@ -353,7 +354,7 @@ def _find_force(printing: Printing) -> tuple[str, int, Pushes]:
     Raises
     ------
     DeckError
-        Unless one contact or wall is given and the history shows when its force acts.
+        If not exactly one contact or wall is given, or if the history does not show when its force acts.
     """
     from d2rpick.deck.contact_timing import Pushes
 
@@ -429,8 +430,8 @@ def _write_sensors(
 ) -> tuple[str, int]:
     """Return the text of sensors with ids from ``first`` on, and the id of the sensor that combines them all.
 
-    The combining sensor is active in each of ``spans``, and while a ``force`` acts, given by the arguments of
-    `write_force_sensor`.
+    The combining sensor is active in each of ``spans``, and while a ``force`` acts, which is described by the arguments
+    of `write_force_sensor`.
     """
     from d2rpick.deck.sensor_cards import (
         write_any_of,
@@ -527,6 +528,18 @@ SOLVERS: Final[Mapping[str, CardSolver]] = {
 }
 
 
+def names_solver(history_format: str) -> bool:
+    """Return True if a format of a history belongs to a solver; a table may come from any of them.
+
+    Examples
+    --------
+    >>> names_solver("glstat + matsum"), names_solver("csv")
+    (True, False)
+    """
+    formats = set(history_format.split(" + "))
+    return any(formats & {*solver.histories} for solver in SOLVERS.values())
+
+
 def find_solver(history_format: str) -> str:
     """Return the solver that wrote a history in this format; several formats are joined by ``+``.
 
@@ -552,7 +565,7 @@ def print_cards(
     Parameters
     ----------
     windows : sequence of (float, float)
-        tr and td of each window [time of the model], 0 <= tr < td, each after the one before.
+        tr and td of each window [time of the model] with 0 <= tr < td, in ascending order.
     printing : Printing
         Solver, parts or bodies to switch, and further options.
     remarks : sequence of str

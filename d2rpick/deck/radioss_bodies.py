@@ -62,9 +62,9 @@ _GROUP_OF_GRAVITY: Final = GRAVITY["grnod_ID"]
 class SwitchedBodies(NamedTuple):
     """The rigid bodies that switch the given parts, and the cards of those bodies that are new.
 
-    ``nodes`` are all their main nodes. ``cards`` are the cards that the starter deck lacks, to be inserted before its
-    /END; empty if it lacks none. ``notes`` describe these cards. ``sensor`` and all ids above it are free for sensors.
-    ``replaced`` are the main nodes of bodies that have to be removed from the starter deck.
+    ``nodes`` contains all their main nodes. ``cards`` is the text to be inserted before /END of the starter deck; empty
+    if no body is missing. ``notes`` describes these cards. ``sensor`` and all ids above it are free for sensors.
+    ``replaced`` contains the main nodes of bodies that have to be removed from the starter deck.
     """
 
     nodes: tuple[int, ...]
@@ -78,8 +78,8 @@ def find_bodies(path: str, parts: Collection[int]) -> SwitchedBodies:
     """Find the rigid bodies of the given parts in a Radioss deck, and write the missing ones.
 
     A new body has a new main node at the centre of mass of its parts, and all their nodes (/GRNOD/PART). The main node
-    is added to the node groups of initial velocities and gravity. Bodies are on by default, so the first engine run has
-    to deactivate them.
+    is added to the node groups of initial velocities and gravity. Bodies are active by default, so the first engine run
+    has to deactivate them.
 
     Parameters
     ----------
@@ -135,7 +135,7 @@ def find_bodies(path: str, parts: Collection[int]) -> SwitchedBodies:
 def find_replaced_bodies(run: RadiossRun, cards: str) -> tuple[Body, ...]:
     """Return the bodies that are inactive throughout the run and share nodes with the new bodies in ``cards``.
 
-    A node belongs to one body, so these bodies have to be removed from the starter deck.
+    A node can belong to only one body, so these bodies have to be removed from the starter deck.
     """
     if run.starter is None or not cards:
         return ()
@@ -224,7 +224,8 @@ def _find_ready_bodies(
 ) -> tuple[int, ...]:
     """Return the main nodes of the bodies in the deck that contain exactly the given parts.
 
-    Empty if no body contains any of their nodes, or only bodies that are never rigid, which a new one replaces.
+    The result is empty if no body contains any of their nodes, or only bodies that are never rigid, which a new body
+    replaces.
     """
     stiff = set(_select_stiff_parts(inventory, group))
     group_nodes = _collect_nodes(stiff, groups)
@@ -338,7 +339,7 @@ class _BodyWriter:
     def _centre(self, parts: Sequence[int]) -> Reals:
         """Return the centre of mass (3,) of the nodes of parts [length], or their mean position if a mass is unknown.
 
-        The starter corrects it.
+        The result need not be exact, because the starter corrects it.
         """
         parts = _select_stiff_parts(self._inventory, parts)
         masses = [
@@ -379,7 +380,7 @@ class _BodyWriter:
     def _reached(self, card: Card, column: CardColumn | None) -> frozenset[int]:
         """Return the nodes of the group whose id is in a column of a card, or the nodes that the card itself lists.
 
-        Empty if a card has no group.
+        The result is empty if a card has no group.
         """
         rows = card.rows[1:]
         if column is None:

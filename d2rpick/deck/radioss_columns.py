@@ -1,7 +1,7 @@
 """Declare the data lines of the Radioss blocks that d2rpick reads or writes.
 
-Names and order: Altair's public help for each keyword, and the solver's published source.  Real numbers have 20
-characters, other fields 10.  Columns after the last one that is read are left out.
+The names and their order come from Altair's public help for each keyword, and from the solver's published source. Real
+numbers have 20 characters, other fields 10. Columns after the last one that is read are omitted.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Read keyword blocks of Radioss files: the engine runs, the bodies that they switch, and the starter deck.
 
-A block is a line that begins with ``/`` with the data lines below it. Columns of the starter deck: Altair's public help
-for /RBODY, /PART, /GRNOD and /SUBSET, and the solver's published source.
+A block consists of a line that begins with ``/`` and the data lines below it. The columns of the starter deck come from
+Altair's public help for /RBODY, /PART, /GRNOD and /SUBSET, and from the solver's published source.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ def read_blocks(source: SourceFile) -> Iterator[Block]:
 def _find_marks(source: SourceFile) -> Iterator[tuple[int, bytes]]:
     """Yield the offset and text of each line that begins with ``/`` or ``#include``.
 
-    Lines of a mesh are not looked at one by one.
+    To save time, the lines of a mesh are not examined one by one.
     """
     position = 0
     for lines in source.pieces(0):
@@ -107,7 +107,7 @@ def _find_marks_in_piece(lines: bytes) -> list[tuple[int, bytes]]:
 def split_keyword(block: Block) -> tuple[str, ...]:
     """Return the words of a keyword line in upper case; no words for an ``#include``.
 
-    The run name in ``/RUN/name/1`` is in upper case too; `Card.block` has it as written.
+    The run name in ``/RUN/name/1`` is in upper case, too; `Card.block` contains it as written.
     """
     if block.head.startswith("/"):
         return tuple(word.strip().upper() for word in block.head[1:].split("/"))
@@ -303,7 +303,8 @@ class Starter:
     def bodies(self) -> Sequence[Body]:
         """Return the rigid bodies, each together with all bodies merged into it.
 
-        A body of /RBODY/LAGMUL, whose keyword has its id elsewhere, is never switched.
+        Bodies of /RBODY/LAGMUL are omitted, because they are never switched; their keyword has the id in a different
+        place.
         """
         return self.rigid.bodies
 

@@ -35,7 +35,7 @@ _NAME: Final = rb"(?mi)^/BEGIN[^\n]*\n(?:[#$][^\n]*\n)*([^\n]*)|^/RUN/([^/\n]+)"
 class Flaw(NamedTuple):
     """A flaw of a Radioss run: a stable ``code``, its place and its message.
 
-    `NOT_FOLLOWED` says what could not be judged.
+    The code `NOT_FOLLOWED` means that something could not be checked, which the message names.
     """
 
     code: str
@@ -57,7 +57,7 @@ def list_run_files(path: str) -> list[str]:
     """Return the files of the run to which ``path`` belongs; empty if it is not a file of a Radioss run.
 
     The starter deck ``NAME_0000.rad`` and the engine files ``NAME_0001.rad`` and so on in one folder belong together. A
-    file of another name belongs to the run that it names in /BEGIN or /RUN.
+    file with a different name belongs to the run that it names in /BEGIN or /RUN.
     """
     try:
         if not os.path.isfile(path):  # noqa: PTH113  pathlib would slow down start-up
@@ -89,8 +89,8 @@ def list_run_files(path: str) -> list[str]:
 def find_root(path: str) -> str:
     """Return the beginning that a run's file names share, such as ``NAME`` for ``NAME_0001.rad``; otherwise empty.
 
-    The engine looks for the restart file whose name begins like its own file, whatever the name in /RUN is. Source:
-    runs computed with OpenRadioss.
+    The engine looks for the restart file whose name has the same beginning as its own file, regardless of the name in
+    /RUN. Source: runs computed with OpenRadioss.
     """
     numbered = re.fullmatch(_NUMBERED, os.path.basename(path))  # noqa: PTH119  pathlib would slow down start-up
     return numbered[1] if numbered else ""

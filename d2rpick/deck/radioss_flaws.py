@@ -100,7 +100,7 @@ class NodeGroups:
 def find_flaws(run: RadiossRun, switched: Collection[int]) -> tuple[Flaw, ...]:
     """Return the flaws of a run in which the rigid bodies with these main nodes are switched or kept inactive.
 
-    A flaw with code `NOT_FOLLOWED` says what is unknown, and why.
+    The message of a flaw with the code `NOT_FOLLOWED` says what could not be checked, and why.
     """
     starter = run.starter
     if starter:
@@ -154,8 +154,8 @@ def _check_wall(
 ) -> Iterator[Flaw]:
     """Yield the flaws of a rigid wall: bodies whose nodes the starter removes from the wall.
 
-    Ikrem 1 keeps the nodes of a body in the wall; OpenRadioss applies the Ikrem of the /RBODY with the highest id to
-    all.
+    With Ikrem 1, the wall keeps the nodes of a body; OpenRadioss applies the Ikrem of the /RBODY with the highest id to
+    all bodies.
     """
     keeps = max(starter.bodies, key=lambda body: body.id).stays
     bodies = [body for body in bodies if not (body.stays and keeps)]

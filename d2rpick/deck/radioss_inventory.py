@@ -1,7 +1,7 @@
 """Read parts, elements, gravity, supports, prescribed motions and joints from a Radioss starter deck.
 
-Columns: Altair's public help for the elements, properties and materials, /GRAV, /FUNCT, /BCS, /IMPVEL, /IMPDISP,
-/IMPACC and /INTER/TYPE2, and the solver's published source.
+The columns come from Altair's public help for the elements, properties and materials, /GRAV, /FUNCT, /BCS, /IMPVEL,
+/IMPDISP, /IMPACC and /INTER/TYPE2, and from the solver's published source.
 """
 
 from __future__ import annotations
@@ -196,7 +196,7 @@ def read_radioss_inventory(run: RadiossRun) -> Inventory:
 def _find_watched_nodes(starter: Starter, *, local: bool) -> Integers:
     """Return the node ids on a /TH/NODE card, below its title and its line of variables.
 
-    If ``local`` is True, only those whose motion is written in a skew system, else only the others.
+    If ``local`` is True, only nodes whose motion is written in a skew system are returned, otherwise only the others.
     """
     rows = [
         row
@@ -595,8 +595,8 @@ def _read_functions(starter: Starter) -> Iterator[tuple[int, tuple[float, ...]]]
 def _find_joints(run: RadiossRun, starter: Starter) -> model.Joints:
     """Return the rigid bodies, and the tied interfaces (/INTER/TYPE2) whose main surface belongs to one part.
 
-    A rigid body that no engine file and no sensor switches is always on, and connects the parts of its nodes. Without
-    engine files all bodies may be switched.
+    A rigid body that no engine file and no sensor switches is always active, and connects the parts of its nodes. If
+    there are no engine files, any body may be switched.
     """
     of_parts = (
         card

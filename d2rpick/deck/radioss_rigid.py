@@ -1,8 +1,9 @@
 """Build rigid bodies as the Radioss starter does: each has a main node, and /MERGE/RBODY merges them.
 
 Source: the published source of OpenRadioss at bd4557ba7 (hm_read_merge.F, hm_rbodies_add_main_node.F90), and runs
-computed with it.  Bodies of parts were not computed, as the function that makes them is in no program at hand: their
-columns are those of the format file (radioss2612, part.cfg), their order is that of a public version of the function.
+computed with it. Bodies of parts were not tested in a run, because the available version of OpenRadioss cannot make
+them: their columns are those of the format file (radioss2612, part.cfg), and their order is that of a public version of
+the function.
 """
 
 from __future__ import annotations
@@ -29,8 +30,8 @@ MADE_HERE: Final = 10**10
 class Body(NamedTuple):
     """A rigid body: its id, main node, sensor and node group; an id of 0 means that there is none.
 
-    ``stays``: the starter keeps its nodes in rigid walls (Ikrem 1, or a sensor). ``part`` is the part from which the
-    starter makes the body (Irigid); such a body has no id in the deck.
+    ``stays`` is True if the starter keeps its nodes in rigid walls (Ikrem 1, or a sensor). ``part`` is the part from
+    which the starter makes the body (Irigid); such a body has no id in the deck.
     """
 
     id: int
@@ -57,7 +58,7 @@ class Merge(NamedTuple):
 
 
 class RigidBodies(NamedTuple):
-    """Rigid bodies as the engine uses them, keyed by main node.
+    """Rigid bodies as the engine uses them.
 
     ``joined_to`` maps the main node of each merged body, which the engine does not know, to the body that contains it.
     ``groups`` are the node groups that contain merged bodies.
@@ -76,11 +77,11 @@ def make_rigid_bodies(
     Parameters
     ----------
     in_deck : sequence of Body
-        Bodies as written in the deck, those of parts last.
+        Bodies as written in the deck, followed by the bodies of parts.
     merges : sequence of Merge
         All lines of /MERGE/RBODY.
     last_node : callable
-        Returns the highest node id; called only if a body has no main node.
+        Function that returns the highest node id; it is called only if a body has no main node.
     """
     bodies = [*_add_main_nodes(in_deck, last_node)]
     if not merges:
@@ -132,8 +133,8 @@ def _add_main_nodes(
 ) -> Iterator[Body]:
     """Yield the bodies with their main nodes, some of which the starter creates.
 
-    The added nodes are numbered above all nodes, in the order of the body ids.  The bodies of parts come last, in the
-    order of the parts in the deck, as their ids are above all others.
+    The ids of the added nodes follow the highest node id, in the order of the body ids. The bodies of parts come last,
+    in the order of the parts in the deck, because their ids are higher than all others.
     """
     lacking = sorted(
         (body for body in in_deck if not body.node.value),

@@ -1,7 +1,7 @@
 """Read when the engine runs or time sensors of a Radioss run make each part rigid, and which parts stay rigid.
 
-Source: Altair's public help for /RBODY in engine files: bodies are on by default in the first run, and keep their state
-in later runs unless an engine file changes it.
+Source: Altair's public help for /RBODY in engine files, according to which bodies are active by default in the first
+run, and keep their state in later runs unless an engine file changes it.
 """
 
 from __future__ import annotations
@@ -48,9 +48,10 @@ from d2rpick.deck.switching import (
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 
+    from d2rpick.base.spans import Spans
     from d2rpick.deck.card import Card
     from d2rpick.deck.radioss_rigid import Body
-    from d2rpick.deck.radioss_sensors import Forces, Spans
+    from d2rpick.deck.radioss_sensors import Forces
 
     Contacts = Callable[[Collection[int]], Spans | None]
 # Number of lines in /BEGIN: the run name, the version, and two lines of units.
@@ -61,7 +62,7 @@ _LINES_OF_BEGIN: Final = 4
 class RadiossRun:
     """A Radioss run: its starter deck (if there is one), and its engine runs in order of their numbers.
 
-    ``deck`` lists its files.
+    ``deck`` contains the list of its files.
     """
 
     deck: Deck
@@ -227,9 +228,9 @@ def find_run_windows(
 ) -> RunWindows:
     """Return the windows of every body that an engine run or a sensor switches.
 
-    A body with unknown parts is one unit, named by its main node.  If the engine runs are not in order, there are no
-    windows. For force sensors ``contacts`` returns the spans in which a contact force acts on some parts, and
-    ``forces`` those in which an interface or wall has a force; None if no history shows them.
+    A body with unknown parts is one unit, identified by its main node. If the engine runs are not in order, there are
+    no windows. For force sensors, ``contacts`` returns the spans in which a contact force acts on given parts, and
+    ``forces`` the spans in which an interface or wall exerts a force; both return None if no history shows them.
     """
     sets = tuple(_list_switches(run.legs)) if is_in_order(run.legs) else ()
     starter = None if run.starter and run.starter.moved else run.starter
@@ -389,12 +390,12 @@ def find_rigid_parts(
     starter : Starter
         The starter deck.
     bodies : mapping
-        Node group by main node.
+        Node groups keyed by main node.
 
     Returns
     -------
     dict
-        Parts by main node; empty if the members of the group are unknown.
+        Parts keyed by main node; there are none if the members of the group are unknown.
     """
     members = {node: starter.group_members(group) for node, group in bodies.items()}
     known_members = {node: found for node, found in members.items() if found}
@@ -491,7 +492,7 @@ def find_left_rigid(
 ) -> LeftRigid | None:
     """Return the bodies with complete parts that no engine run names although the run has rigid ``windows``.
 
-    None if there are none.
+    The result is None if there are no such bodies.
     """
     if run.starter is None or run.starter.moved or not windows:
         return None

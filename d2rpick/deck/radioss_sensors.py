@@ -1,9 +1,9 @@
 """Find when the sensors of a Radioss run are active.
 
-A rigid body with a sensor is deformable while the sensor is active, and rigid while it is not, whatever /RBODY/ON and
-/RBODY/OFF say. Source: Altair's public help for /SENSOR and /RBODY, the published source of OpenRadioss at bd4557ba7
-(sensor_time.F, sensor_init.F, rbyonf.F), and runs computed with it: Tstop has a line of its own, and is read in every
-version of the format; the delay of a sensor with other sensors as input has no effect.
+A rigid body with a sensor is deformable while the sensor is active and rigid while it is not, regardless of /RBODY/ON
+and /RBODY/OFF. Source: Altair's public help for /SENSOR and /RBODY, the published source of OpenRadioss at bd4557ba7
+(sensor_time.F, sensor_init.F, rbyonf.F), and runs computed with it. In these runs, Tstop had a line of its own and was
+read in every version of the format, and the delay of a sensor with other sensors as input had no effect.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ from d2rpick.deck.radioss_deck import (
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
+    from d2rpick.base.spans import Spans
     from d2rpick.deck.card import Row
 
-    Spans = tuple[tuple[float, float], ...]  # Start and end of each time span [time].
     # A function that returns the time spans in which the force of an interface or rigid wall acts; None if unknown.
     Forces = Callable[[str, int], Spans | None]
 
@@ -43,12 +43,13 @@ _SINGLE: Final = 1e-6
 
 
 class Course(NamedTuple):
-    """Data that determine when the sensors of a run are active: its end, its restarts, and the times of forces.
+    """Data that determine when the sensors of a run are active: their resets, and the times at which forces act.
 
-    The time of the first reset of each sensor, and the spans in which contact forces act [time].
+    ``resets`` contains the time of the first reset of each sensor [time], keyed by its id.
 
-    ``contacts`` are the spans of the only contact or rigid wall of the deck; None if no history shows them. ``forces``
-    returns the spans of one contact or wall from its written force, and is preferred.
+    ``contacts`` contains the spans in which the only contact or rigid wall of the deck acts; None if no history shows
+    them. ``forces`` returns the spans in which one contact or wall acts according to its written force, and is
+    preferred.
     """
 
     resets: Mapping[int, float] = MappingProxyType({})
@@ -72,8 +73,8 @@ def find_active_spans(
 ) -> Spans | str:
     """Return the ordered time spans in which a sensor is active, or text that says what is unknown.
 
-    ``above`` are sensors that ask for this one.  A sensor of time that is reset is active for one more cycle at most:
-    its Tstop is lost.
+    ``above`` contains the sensors whose inputs lead to this sensor. A time sensor that is reset is active for at most
+    one more cycle, because its Tstop is lost.
     """
     card = starter.sensors.get(number)
     if card is None or number in above:
@@ -155,7 +156,7 @@ def find_contacts_of_sensor(
 ) -> Spans | None:
     """Return the time spans of the forces for which a sensor, directly or through its inputs, waits [time].
 
-    None if it waits for none, or if no history shows it.
+    The result is None if the sensor waits for no force, or if no history shows the force.
     """
     force_spans = []
     for sensor in find_reachable(
@@ -208,7 +209,9 @@ def require_forces(path: str, starter: Starter) -> list[tuple[str, int]]:
     forces = list_forces(starter)
     if not forces:
         raise DeckError(
-            f"{path}: the deck has no contact and no rigid wall, so nothing would end a flight"
+            f"{path}: the deck has no contact and no rigid wall, so nothing would end a flight; add the /INTER or "
+            "/RWALL that the parts hit, or compute a reference run and choose the times from it "
+            "(d2rpick plan)"
         )
     return forces
 

@@ -121,7 +121,7 @@ def _read_include_card(
 ) -> Iterator[tuple[CardField, Transform, tuple[Problem, ...]]]:
     """Yield, for each file on an ``*INCLUDE`` card, its name, its transform and the fields that could not be read.
 
-    ``*INCLUDE`` has one name per line, ``*INCLUDE_TRANSFORM`` one name and then numbers.
+    ``*INCLUDE`` has one name per line, and ``*INCLUDE_TRANSFORM`` one name followed by lines of numbers.
     """
     names = _read_file_names(card)
     if card.name == "INCLUDE":
@@ -208,8 +208,8 @@ def _make_portable(name: str) -> str:
 class Deck:
     """A deck as read: the relevant ``cards``, the ``disabled`` cards (*COMMENT), encrypted blocks and includes.
 
-    ``problems`` are unreadable numbers of includes. ``ends`` are the last blocks of files without *END, and True for
-    the main file. ``restarts`` are the restarts that continue its run.
+    ``problems`` contains unreadable numbers on include cards. ``ends`` contains the last block of each file without
+    *END, and True if the file is the main file. ``restarts`` contains the restarts that continue the run.
     """
 
     path: str
@@ -299,8 +299,8 @@ def read_deck(path: str, content: bytes | SourceFile | None = None) -> Deck:
     path : str
         The main deck; messages show file names relative to it as given here.
     content : bytes or SourceFile, optional
-        Content of the main deck if it is not a file, or the file if it is open already; its includes are searched in
-        the folder of ``path``.
+        Content of the main deck if it is not a file, or the file if it is already open; its includes are searched for
+        in the folder of ``path``.
 
     Returns
     -------
@@ -453,7 +453,7 @@ class _Reader:
 def explain_unread(path: str | None, chain: Sequence[str]) -> str:
     """Return the reason why an include file is not read; empty if it is read.
 
-    ``chain`` are the real paths of the files that include it.
+    ``chain`` contains the real paths of the files that include it.
     """
     if path is None:
         return "no such file"
@@ -489,8 +489,8 @@ def _parse_keyword(head: str) -> tuple[str, str]:
 def find_cuts(deck: Deck) -> Iterator[tuple[Block, str]]:
     """Yield the last block of each file that seems to be truncated, with the evidence.
 
-    An include may have no *END. A main file without *END is reported if it ends within a mesh, because the program that
-    writes a mesh also writes the end. A last line without line end may lack digits of a number.
+    An include need not have *END. A main file without *END is reported if it ends within a mesh, because a program that
+    writes a mesh also writes *END. In a last line without a line end, digits of a number may be missing.
     """
     files = set()
     for block, main in deck.ends:

@@ -1,7 +1,7 @@
 """Join small restart decks of LS-DYNA to a run; the cards of a restart switch when the previous run ends.
 
-A small restart has no parts. Its *RIGID_DEFORMABLE cards have no time: they act when the restart begins, at the ENDTIM
-of the run before. Source: the vendor's keyword data as published in its Python library.
+A small restart has no parts. Its *RIGID_DEFORMABLE cards have no time; they act when the restart begins, at the ENDTIM
+of the previous run. Source: the vendor's keyword data as published in its Python library.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ def is_restart(path: str) -> bool:
 def join_restarts(main: Deck, restarts: Sequence[str]) -> Deck:
     """Return a run and its restarts as one deck in which each restart card has a time.
 
-    The times stay unknown unless each run has an end later than the one before.
+    The times remain unknown unless each run ends later than the previous one.
 
     Raises
     ------

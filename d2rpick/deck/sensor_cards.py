@@ -54,9 +54,9 @@ def write_flight_sensors(
     Parameters
     ----------
     contacts : sequence of (str, int)
-        Kind and id of each contact and rigid wall, as `write_force_sensor` takes them.
+        Kind and id of each contact and rigid wall, as in `write_force_sensor`.
     wait, first_switch : float
-        Force-free time that shows a flight, and the earliest time at which a flight is detected [time].
+        Force-free time after which a flight is detected, and the earliest time of a detection [time].
 
     Returns
     -------

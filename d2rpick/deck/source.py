@@ -195,7 +195,7 @@ class SourceFile:
     Raises
     ------
     DeckError
-        If the file cannot be opened; from any method, if it has been changed since.
+        If the file cannot be opened; any method also raises it if the file has been changed since then.
     """
 
     def __init__(

@@ -1,9 +1,9 @@
 """Provide the bytes of a deck file as one consistent snapshot, either held in memory or read on request.
 
-An editor or a pre-processor may save a deck again while its rows are still to be read. A small file is kept in memory.
-A large file is opened for each read, so that many includes do not use up the open files of a process; an error is
-raised if it has changed. Files are not mapped into memory, because the system ends a process whose mapped page
-disappears.
+An editor or a pre-processor may save a deck again before all of its rows have been read. A small file is kept in
+memory. A large file is opened for each read, so that many includes do not exceed the number of files that a process may
+open; an error is raised if the file has changed. Files are not mapped into memory, because the system kills a process
+whose mapped page disappears.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ class DeckOnDisk:
     def opened(self) -> Iterator[Filling]:
         """Provide a function that copies bytes into a buffer.
 
-        On leaving the context it is checked that the file is unchanged.
+        On leaving the context, an error is raised if the file has changed.
         """
         with _open_file(self._name) as file:
             yield lambda room, begin, end: self._fill(file, room, begin, end)
@@ -114,7 +114,7 @@ def open_stored(name: str) -> HeldInMemory | DeckOnDisk:
     Raises
     ------
     DeckError
-        If it cannot be opened, is a device, or keeps changing.
+        If the file cannot be opened, is a device, or changes repeatedly.
     """
     with _open_file(name) as file:
         state = read_at_rest(name, file, DeckError)

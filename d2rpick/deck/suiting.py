@@ -26,9 +26,10 @@ _FIRST: Final = 901
 class Suiting(NamedTuple):
     """Requirements that a deck places on a card; None and False mean that there is no requirement.
 
-    ``solver`` is the solver of the deck, ``name`` and ``end`` [time] belong to its run. ``swset`` are free ids of
-    switch sets; the ids above them are free for part sets too. ``delete_nodal_bodies`` and ``delete_node_sets``: the
-    deck has such constraints, all of them on the parts, so they have to be deleted while the parts are rigid.
+    ``solver`` is the solver of the deck; ``name`` and ``end`` [time] are those of its run. ``swset`` contains free ids
+    of switch sets; the ids above them are free for part sets, too. ``delete_nodal_bodies`` and ``delete_node_sets`` are
+    True if the deck has such constraints, and only on these parts, so that they have to be deleted while the parts are
+    rigid.
     """
 
     solver: str

@@ -65,8 +65,8 @@ def _find_leads(ids: Sequence[int], printing: Printing) -> dict[int, int]:
 class Waiting(NamedTuple):
     """Conditions of a switch set: CODE, the contact, and TIME3 [time].
 
-    ``latest``: TIME2, the last time at which it switches [time]. ``offset``: the gap before a contact at which it
-    switches. 0 stands for none.
+    ``latest`` is TIME2, the last time at which the set switches [time]. ``offset`` is the gap before a contact at which
+    it switches [length]. A value of 0 stands for no such condition.
     """
 
     code: int = 0
@@ -87,9 +87,8 @@ def write_header(
 ) -> Iterator[str]:
     """Yield the header lines of a switch set; TIME1 is ``time``, or the earliest time for a set that needs a force.
 
-    ``pair`` are the id of the other set and PAIRED, used if the set waits.  ``counts`` are D2R and R2D.
-    ``constraints`` are NRBF and NCSF: 0 keeps constraints, 1 deletes them, 2 activates
-    them.
+    ``pair`` contains the id of the other set and PAIRED, which are needed if the set waits. ``counts`` contains D2R and
+    R2D. ``constraints`` contains NRBF and NCSF: 0 keeps constraints, 1 deletes them, 2 activates them.
     """
     other, paired = pair if waiting.code else (0, 0)
     yield "*DEFORMABLE_TO_RIGID_AUTOMATIC"
@@ -128,7 +127,8 @@ def write_set_pair(
 ) -> Iterator[str]:
     """Yield the lines of a switch set that makes parts rigid and of one that makes them deformable again.
 
-    ``sets``, ``times`` and ``waits`` are those of the two sets.  ``step_cap`` holds while the parts are rigid.
+    ``sets``, ``times`` and ``waits`` contain one value for each of the two sets. ``step_cap`` applies while the parts
+    are rigid.
     """
     rigid_lines = [*write_rigid_lines(ids, printing, part_sets)]
     deformable_lines = [*write_deformable_lines(ids, part_sets)]

@@ -2,8 +2,8 @@
 
 The cards are *DEFORMABLE_TO_RIGID, its variants, and the restart cards *RIGID_DEFORMABLE.
 
-Columns and defaults: the vendor's keyword data as published in its Python library, and two independent sources. PTYPE
-has different columns on D2R and R2D lines, which several writers of decks got wrong.
+The columns and defaults come from the vendor's keyword data as published in its Python library, and from two
+independent sources. PTYPE has different columns on D2R and R2D lines; several programs that write decks confuse them.
 """
 
 from __future__ import annotations
@@ -87,7 +87,8 @@ class SwitchHeader(NamedTuple):
 class SwitchSet:
     """One switching card: its header (if any) and its parts.
 
-    ``count_problem`` says how lines and counts differ, or is empty. ``values`` are all its fields.
+    ``count_problem`` states how the numbers of lines differ from the counts; it is empty if they agree. ``values``
+    contains all fields of the card.
     """
 
     card: Card
@@ -230,7 +231,10 @@ def _read_automatic(card: Card) -> SwitchSet:
     rigid = max(rigid, 0)
     deformable = max(deformable, 0)
     switched = [
-        _read_part_line(card, row, to_rigid=True, ptype=True)
+        # If the counts are wrong, a line may belong to the other list.
+        _read_part_line(
+            card, row, to_rigid=not (problem and _is_back_line(row)), ptype=True
+        )
         for row in lines[:rigid]
         if not row.blank
     ]
@@ -267,8 +271,13 @@ def _is_part_line(row: Row) -> bool:
     )
 
 
+def _is_back_line(row: Row) -> bool:
+    """Return True if a line has its PTYPE in the column of a part that becomes deformable."""
+    return row.cell(TO_DEFORMABLE["PTYPE"].position).upper() in _PTYPES
+
+
 def _count_lines(count: int) -> str:
-    """Describe the number of part lines after the header lines."""
+    """Return a phrase that states how many part lines follow the header lines."""
     return "1 part line follows" if count == 1 else f"{count or 'no'} part lines follow"
 
 
@@ -414,7 +423,7 @@ class SwitchEvent(NamedTuple):
 class SwitchWindow(NamedTuple):
     """A rigid window of a part or other unit from ``tr`` to ``td`` [time of the deck]; ``td`` is None if it has no end.
 
-    ``td`` may be earlier than ``tr`` if the cards say so, which a rule reports.
+    ``td`` may be earlier than ``tr`` if the cards contain such times, which a rule reports.
     """
 
     unit: Unit
@@ -449,10 +458,11 @@ def find_windows(
 ) -> Windows:
     """Return the windows of every part, from the cards in order of their times.
 
-    ``by_sensor`` are switches by sensors with their times, which the cards do not contain.
+    ``by_sensor`` contains the switches by sensors with their times, which the cards do not contain.
 
-    Part sets are replaced by their parts. A part that is made rigid while it is rigid (a new lead) stays in its window.
-    If a part is switched back first and made rigid later, and nothing else matches, the two form one inverted window.
+    Part sets are replaced by their parts. If a part that is already rigid is made rigid again (with a new lead part),
+    its window continues. If a part is switched back first and made rigid later, and no other switch matches, the two
+    form one inverted window.
     """
     events = tuple(event for card in sets for event in _list_events(card, parts))
     timed: dict[Unit, list[tuple[float, SwitchEvent]]] = defaultdict(list)

@@ -1,12 +1,12 @@
 """Find the parts that must not be switched whatever their energy, and the reasons.
 
 Material that flows through its mesh is not a body. A law that computes the stress from the deformation since the start
-has that start as its stress-free reference. What the part underwent as a rigid body (a stress that was set to zero, or
-a motion that is not its own) becomes a deformation when it is switched back.
+has the start as its stress-free reference. The changes of the part while it is rigid (stresses that were set to zero,
+or a motion that differs from its own) become a deformation when it is switched back.
 
 Source: the vendor's keyword data for ELFORM, the theory of the laws, Altair's public help for /ALE/MAT, /EULER/MAT,
-/PROP/SOLID and the laws, and a report of 2026 on LS-DYNA R14 (a hyperelastic solid that had stress after the switch
-back). Not tried with LS-DYNA.
+/PROP/SOLID and the laws, and a report of 2026 on LS-DYNA R14 (a hyperelastic solid that had stress after it was
+switched back). This was not tested with LS-DYNA.
 """
 
 from __future__ import annotations
@@ -27,13 +27,12 @@ if TYPE_CHECKING:
 # Formulations of *SECTION_SOLID (ELFORM) in which material flows through the mesh.
 _FLOWING: Final = {5: "ALE", 6: "Eulerian", 7: "Eulerian", 11: "ALE", 12: "ALE"}
 # Patterns of the *MAT keywords, by name and number, of material laws with a stress-free reference state.
-_REFERENCE_BY_NAME: Final = re.compile(
+# They are compiled at their first use, to keep start-up fast.
+_REFERENCE_BY_NAME: Final = (
     r"MAT_(BLATZ-KO|MOONEY-RIVLIN|FRAZER_NASH|FRAZER-NASH|HYPERELASTIC|OGDEN|ARRUDA_BOYCE|SIMPLIFIED_RUBBER"
     r"|SOFT_TISSUE|LOW_DENSITY_FOAM|FU_CHANG_FOAM|ORTHOTROPIC_ELASTIC|ANISOTROPIC_ELASTIC)"
 )
-_REFERENCE_BY_NUMBER: Final = re.compile(
-    r"MAT_0*(2|7|27|31|57|77|77_[HO]|83|91|92|127|181)(_|\Z)"
-)
+_REFERENCE_BY_NUMBER: Final = r"MAT_0*(2|7|27|31|57|77|77_[HO]|83|91|92|127|181)(_|\Z)"
 _LAWS_WITH_REFERENCE: Final = {
     *(
         "LAW42",
@@ -57,7 +56,7 @@ _GAINS: Final = "so it may gain stress when it is switched back"
 class Unswitchable(NamedTuple):
     """The reason why a part must not be switched.
 
-    ``flows``: its material flows through the mesh, else its law keeps a reference.
+    ``flows`` is True if its material flows through the mesh, and False if its material law has a reference state.
     """
 
     flows: bool
@@ -82,7 +81,9 @@ def find_unswitchable_in_ls_dyna(
             reasons[part] = _make_flowing(
                 f"{_FLOWING[section.elform]}, ELFORM {section.elform}"
             )
-        elif _REFERENCE_BY_NAME.match(law) or _REFERENCE_BY_NUMBER.match(law):
+        elif law and (
+            re.match(_REFERENCE_BY_NAME, law) or re.match(_REFERENCE_BY_NUMBER, law)
+        ):
             reasons[part] = _make_with_reference(f"*{law}")
     return reasons
 

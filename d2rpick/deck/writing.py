@@ -65,9 +65,10 @@ def write_deck(
 ) -> list[str]:
     """Write a deck with printed cards into a folder.
 
-    LS-DYNA: the main file, unchanged except for one ``*INCLUDE`` of the cards before ``*END``, the cards, and the files
-    that the deck includes from its own folder and below. Radioss: the starter deck and its includes, and an engine file
-    for each leg, with the other keywords of the run's engine file.
+    For LS-DYNA, the files are the main file, which is unchanged except for one ``*INCLUDE`` of the cards before
+    ``*END``, the cards, and the files that the deck includes from its own folder and subfolders. For Radioss, they are
+    the starter deck and its includes, and a file for each engine run, with the other keywords of the original engine
+    file.
 
     Parameters
     ----------
@@ -83,14 +84,14 @@ def write_deck(
     Returns
     -------
     list of str
-        The files written, the main deck first.
+        Paths of the written files, beginning with the main deck.
 
     Raises
     ------
     DeckError
-        If the deck switches one of these parts already, uses the id of a switch set, includes a file that would not be
-        found from ``folder``, or has a main file that seems to be truncated; if a file exists; if the card is for
-        another solver.
+        If the deck already switches one of these parts, uses the id of a switch set, includes a file that would not be
+        found from ``folder``, or has a main file that seems to be truncated; if a file already exists; or if the card
+        is for a different solver.
     """
     files = dict(
         _write_radioss(main, card)
@@ -269,7 +270,7 @@ def _keep_bodies_off(
 ) -> Iterator[str]:
     """Return lines that keep bodies inactive in a printed engine run; otherwise, they would be rigid from time 0 on.
 
-    Left out are bodies that the leg switches, and those whose main nodes are ``replaced_nodes``.
+    Bodies that the engine run switches, and bodies whose main nodes are in ``replaced_nodes``, are omitted.
     """
     switched_nodes = {node.value for _, _, ids in printed_leg.switched for node in ids}
     switched_nodes.update(replaced_nodes)
@@ -316,12 +317,12 @@ def _remove_bodies(source: SourceFile, bodies: Collection[int]) -> bytes:
 def _add_sensors(source: SourceFile, sensors: Mapping[int, int]) -> bytes:
     """Return a file of the starter deck with bodies switched by ``sensors``, which are keyed by main node.
 
-    The /BEGIN of the file gets a version in which time sensors have an end.
+    The version in /BEGIN of the file is raised to one in which time sensors can end.
 
     Raises
     ------
     DeckError
-        If a body has a sensor already.
+        If a body already has a sensor.
     """
     content = source.read(0)
     edits = dict[int, tuple[int, bytes]]()
@@ -439,9 +440,9 @@ def read_block(block: Block) -> bytes:
 class DrivenDeck(NamedTuple):
     """A run to be driven: its name, its end, its switched parts, copied files, and the keywords of each engine run.
 
-    ``nodes`` are the main nodes of the rigid bodies of ``parts``, ``others`` are main nodes of bodies that stay off.
-    ``interval`` is the output interval of the time history. ``second`` is the length of a second in the time unit of
-    the run; None if the deck names no unit [time].
+    ``nodes`` contains the main nodes of the rigid bodies of ``parts``, and ``others`` those of bodies that stay
+    inactive. ``interval`` is the output interval of the time history [time]. ``second`` is the length of a second in
+    the time unit of the run [time]; None if the deck names no unit.
     """
 
     name: str
@@ -460,8 +461,8 @@ class DrivenDeck(NamedTuple):
     ) -> bytes:
         """Write one engine file of the run; the bodies are rigid if a time-step limit ``cap`` is given.
 
-        ``frozen``: the bodies are rigid already, and must not be activated again, as OpenRadioss would add their energy
-        twice.
+        ``frozen`` is True if the bodies are already rigid and must not be activated again, because OpenRadioss would
+        add their energy twice.
         """
         file = EngineFile(number, until, cap)
         lines = write_engine_lines(
@@ -484,16 +485,16 @@ def read_driven_deck(path: str, parts: Collection[int]) -> DrivenDeck:
     Parameters
     ----------
     path : str
-        The starter deck of the run or an engine file; of several engine files the first defines the output, the last
-        the end.
+        The starter deck or an engine file of the run; of several engine files, the first defines the output and the
+        last the end.
     parts : collection of int
-        Parts to switch; default: the parts of the bodies that the first engine file deactivates.
+        Parts to be switched; the default is the parts of the rigid bodies that the first engine file deactivates.
 
     Raises
     ------
     DeckError
-        If it is not a Radioss run with a starter deck and an engine file that defines the interval of the time
-        history, or the parts cannot become rigid bodies.
+        If the files are not a Radioss run with a starter deck and an engine file that defines the interval of the time
+        history, or if the parts cannot become rigid bodies.
     """
     # Imported here to keep start-up fast.
     from d2rpick.deck.radioss_bodies import find_bodies

@@ -32,7 +32,7 @@ _MOST_NODES: Final = 50
 class Frame(NamedTuple):
     """Orientation of a body: ``axes`` (n, 3, 3) rotate directions in the deck to the directions at each time.
 
-    ``doubt`` is the angle by which bending of the body turns its frame from one time to another [rad].
+    ``doubt`` is the angle by which bending of the body may turn its frame between two times [rad].
     """
 
     axes: Samples
@@ -45,9 +45,9 @@ def fit_frame(deck: Samples, where: Samples, mass: Samples) -> Frame | None:
     Parameters
     ----------
     deck : array of shape (points, 3)
-        Places in the deck [length].
+        Positions in the deck [length].
     where : array of shape (n, points, 3)
-        Places over time [length].
+        Positions over time [length].
     mass : array of shape (points,)
         Weights of the points.
 
@@ -73,7 +73,7 @@ def find_frame_of_nodes(
 ) -> Frame | None:
     """Find the orientation of parts (ids) at times (n,) from the written motion of their nodes.
 
-    None if it is unknown, also because the motion is not written throughout these times.
+    The result is None if the orientation is unknown or if the motion is not written at all these times.
     """
     coordinates = placement.find_watched_nodes(parts)
     spread_ids = list(coordinates)[:: -(-len(coordinates) // _MOST_NODES) or 1]
@@ -102,7 +102,7 @@ def choose_frame_parts(
 ) -> Sequence[int]:
     """Return the parts that define the frame of a body, i.e. connected parts that do not move relative to each other.
 
-    ``members`` and ``moving`` are columns of the ``parts``, which have these ``masses`` (parts,).
+    ``members`` and ``moving`` are column indices of ``parts``, whose masses are ``masses`` (parts,).
     """
     still = [i for i in members if i not in moving]
     together = placement.hanging_together([parts[i].id for i in still])
@@ -115,8 +115,8 @@ def choose_frame_parts(
 def _estimate_doubt(shape: Samples, bent: Samples, mass: Samples) -> float:
     """Return by how much the rotation between two times varies if the parts of the frame are omitted one at a time.
 
-    Parts about their centre, (parts, 3), deviate from their shape by ``bent`` (n, parts, 3) (jackknife); two parts on a
-    line determine no angle and give 0.
+    This is a jackknife estimate. The positions of the parts relative to their centre, shape (parts, 3), deviate from a
+    rigid shape by ``bent`` (n, parts, 3). Two parts on a line do not determine an angle; the result is then 0.
     """
     count = mass.size
     alone = mass * mass.sum() / (mass.sum() - mass)
@@ -145,7 +145,7 @@ def _fit_orientations(shape: Samples, where: Samples, mass: Samples) -> Samples:
 def _measure_bending(shape: Samples, places: Samples, mass: Samples) -> float:
     """Return the rms deviation of points from a rigid shape, relative to its smallest radius of gyration [-].
 
-    Infinite if the points lie on a line.
+    It is infinite if the points lie on a line.
     """
     moments = compute_second_moments(shape[np.newaxis], mass)[0] / mass.sum()
     *across, along = np.linalg.eigvalsh(moments).tolist()

@@ -35,8 +35,8 @@ _LEAST_TURNS: Final = 4
 class Described(NamedTuple):
     """A window in which an oscillator model describes the vibration, given by its first and last state [time].
 
-    ``energy`` returns the kinetic plus elastic energy of the vibration at times (n,).  ``alpha`` is its damping
-    [1/time], None if several modes have different dampings.
+    ``energy`` returns the kinetic plus elastic energy of the vibration at times (n,) [energy]. ``alpha`` is the damping
+    rate [1/time]; it is None if several modes have different damping rates.
     """
 
     start: float
@@ -62,13 +62,13 @@ def choose_flight(
     td : float
         [time]
     seen : Seen
-        What the evidence shows at td.
+        Evidence at td.
     described : Described or None
-        The window that an oscillator or modes describe.
+        Window in which an oscillator or modes describe the energy.
     quiet : QuietTime or None
-        The window around td in which the energy shows no load.
+        Window around td in which the energy shows no load.
     after, landing : float or None
-        End of the load and next contact, if the user gives them [time].
+        End of the load and time of the next contact, if the user gives them [time].
     """
     flight = find_flight(history, seen, described, quiet)
     if seen.held:
@@ -122,7 +122,7 @@ def _make_seen_flight(
 ) -> Flight:
     """Return the flight that the evidence shows.
 
-    If the energies do not show gravity, use an oscillator to find the flight.
+    If the energies do not show gravity, an oscillator is used to find the flight.
     """
     gravity = shown.gravity
     if described and seen.source in BY_ENERGIES and isnan(gravity):
@@ -182,8 +182,8 @@ def start_flight_at(
 ) -> Flight:
     """Start the flight around ``td`` at ``after``, the end of the load as given by the user [time].
 
-    Evidence against this becomes a doubt.  A contact that the evidence shows between ``after`` and td still ends the
-    flight, since the user has said nothing about it.
+    Evidence that contradicts ``after`` becomes a doubt. A contact that the evidence shows between ``after`` and td
+    still limits the flight, because the user did not give any time for it.
     """
     if (
         flight.start is None
@@ -224,7 +224,7 @@ def end_flight_at(
 ) -> Flight:
     """End the flight around ``td`` at ``landing``, the next contact as given by the user [time].
 
-    Evidence against this becomes a doubt.
+    Evidence that contradicts ``landing`` becomes a doubt.
     """
     if flight.start is None or landing <= flight.start:
         return flight
@@ -287,7 +287,7 @@ def _detect_load_in_window(history: History, described: Described) -> float:
 def _explain_why_fed(history: History, start: float, end: float) -> str | None:
     """Return the reason why, according to the energies, a window cannot be a flight; None if it can be one.
 
-    Either kinetic plus internal energy changes, or nothing but the vibration moves.
+    Either kinetic plus internal energy changes, or there is no motion besides the vibration.
     """
     balance = history.balance
     energy = history.mean_energy(start, end)

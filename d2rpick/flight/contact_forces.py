@@ -1,7 +1,7 @@
 """Find flights from contact and rigid-wall forces; a flight is a window in which no such force acts.
 
-Forces are exact where energies and momenta are not: a part that touches nothing has none.  But a contact does not name
-its parts, and a contact whose force is not written, or any other load, may act all the same.
+Forces are more exact than energies and momenta, because they are 0 for a part that touches nothing. But the files do
+not name the parts of a contact, and contacts whose force is not written, or other loads, may act as well.
 """
 
 from __future__ import annotations
@@ -45,9 +45,9 @@ class Touches(NamedTuple):
     ) -> Touches | None:
         """Combine the forces of all intermittent contacts; None if there are no such contacts.
 
-        A contact that always acts holds parts together, like a tied one; one that never acts may belong to other parts.
-        One that does not change the momentum of the ``whole`` model, if this is known, acts between the model's own
-        parts.  If the forces were written at different times, the period that all of them cover is used.
+        A contact that always acts holds parts together, like a tied contact; a contact that never acts may belong to
+        other parts. A contact that does not change the momentum of the ``whole`` model, if this is known, acts between
+        parts of the model. If the forces were written at different times, the period that all of them cover is used.
         """
         telling = [force for force in forces if force.tells]
         telling = telling if whole is None else _select_outer_forces(telling, whole)
@@ -97,9 +97,9 @@ def _select_outer_forces(
 ) -> list[ContactForce]:
     """Return the forces whose impulses change the momentum of the model, apart from constant gravity.
 
-    An impulse from outside changes the momentum by its full size, with either sign, since a file may contain either
-    side of the contact.  For velocities, whose mass is unknown, the largest share counts as the full size.  Forces
-    whose impulses are unknown are kept.
+    The impulse of an external force changes the momentum by its full size, with either sign, because a file may contain
+    the force on either side of the contact. If only velocities are known and the mass is not, the largest ratio of
+    velocity change to impulse is treated as the full size. Forces whose impulses are unknown are kept.
     """
     complete_forces = [force for force in forces if np.isfinite(force.impulses).all()]
     if not complete_forces or whole.time.size <= len(complete_forces) + 1:
@@ -142,11 +142,11 @@ def _sum_impulses_between(force: ContactForce, time: Samples) -> Samples:
 def is_deformed(history: History, flight: FreeFlight) -> bool:
     """Return True if the internal energy rises during the flight, which shows a load that the files do not contain.
 
-    In a flight the energy vibrates about its level or falls by damping.
+    In a flight, the energy oscillates about its level or falls because of damping.
     """
     energy = history.between(flight.start, flight.end)[1]
-    means = np.array(
-        [piece.mean() for piece in np.array_split(energy, _PIECES) if piece.size]
-    )
+    pieces = np.array_split(energy, _PIECES)
+    means = np.array([piece.mean() for piece in pieces if piece.size])
     rise = means - np.minimum.accumulate(means)
-    return float(rise.max(initial=0.0)) > _RISE * float(np.abs(history.energy).max())
+    highest = float(np.abs(history.energy).max())
+    return float(rise.max(initial=0.0)) > _RISE * highest

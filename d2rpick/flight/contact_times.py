@@ -1,12 +1,11 @@
 """Find in which output intervals a force other than gravity acts on the parts, from their momenta.
 
-In flight the momentum changes between two states by gravity alone.  The longest flight shows this change.  If the
-momentum changes by more than that, and by more than numerical errors, a force acts.  A force that starts and ends
-within one interval counts as one force.
-If the force of a contact is written, momenta are not needed.
+In flight, only gravity changes the momentum between two states, and the longest flight shows this change. If the
+momentum changes by more, and the difference exceeds numerical errors, another force acts. If the force of a contact is
+written, momenta are not needed.
 
-A force begins and ends somewhere within an interval of the record.  The middle of that interval is the best estimate,
-with an error of at most half an interval.
+A force begins and ends somewhere within an output interval. The middle of this interval is the best estimate, with an
+error of at most half an interval.
 """
 
 from __future__ import annotations
@@ -37,7 +36,8 @@ _OF_ONE_INTERVAL: Final = 1 / 3
 class ContactTimes(NamedTuple):
     """Periods in which a force acts: ``spans`` (from, to) [time], whose ends are accurate to half of ``interval``.
 
-    ``speed`` is the speed of the parts at the end of the longest flight [length/time], None if there are no masses.
+    ``speed`` is the speed of the parts at the end of the longest flight [length/time]; it is None if the masses are
+    unknown.
     """
 
     spans: tuple[tuple[float, float], ...]
@@ -110,12 +110,13 @@ def find_force_times(force: ContactForce, least: float = 0.0) -> ContactTimes | 
     force : ContactForce
         As read from a file.
     least : float
-        Intervals whose mean force is below this are treated as free of force [force]; with 0 any force counts.
+        Intervals whose mean force is below this limit are treated as free of force [force]; if it is 0, any force is
+        used.
 
     Returns
     -------
     ContactTimes or None
-        None if there are too few states, or if ``least`` is given although only changes of the force are known.
+        None if there are too few states, or if ``least`` is positive although only changes of the force are known.
     """
     time = force.time
     acts = force.acts

@@ -1,8 +1,8 @@
 """Find the parts of a switched run that are deformable again in a flight after the rigid windows.
 
-While a rigid body has absorbed parts, their momenta are not written, and the flights of a switched run are those of the
-whole model.  In a flight during which the momenta of the parts add up to that of the model, they show how the parts
-move against each other, as in a reference run.
+The momenta of parts that a rigid body has absorbed are not written, so the flights of a switched run are those of the
+whole model. If the momenta of the parts add up to that of the model throughout a flight, they show how the parts move
+relative to each other, as in a reference run.
 """
 
 from __future__ import annotations
@@ -24,8 +24,9 @@ if TYPE_CHECKING:
 def restore_parts(history: History, flight: Flight) -> tuple[History, Flight]:
     """Return the record and a flight of the whole model with the parts that move in it, if these are deformable.
 
-    Record and flight are returned unchanged if the flight has parts, or if a rigid body has absorbed parts in one of
-    its states. The momenta of the parts are those of the states around the flight in which no part is absorbed.
+    The record and the flight are returned unchanged if the flight already has parts, or if a rigid body has absorbed
+    parts in one of its states. The momenta of the parts are those of the states around the flight in which no part is
+    absorbed.
     """
     written = history.evidence.written
     if written is None or flight.parts is not None:

@@ -39,19 +39,21 @@ MOST_WORK: Final = 0.04
 _AGREEING: Final = ("contact-force", "contact-energy")
 # Sources that may miss a load, because some forces are not written and fixed walls do no work.
 _PARTIAL: Final = (*BY_ENERGIES, "contact-force")
-# Two flight ends agree up to this difference, as a fraction of the flight [-] and in output intervals [-].
+# _SAME: the ends of two flights agree up to this difference, as a fraction of the flight [-].
+# _SAME_STATES: they also agree up to this difference [output intervals].
 _SAME, _SAME_STATES = 0.01, 3
 
 
 class Flight(NamedTuple):
     """A window of free flight [time]; ``start`` is None if unknown, ``end`` is None if the data show no later contact.
 
-    If nothing flies at td, it is the last flight before td, or else the first one after it, and ``refusal`` gives the
-    reason.  ``source`` is the evidence for the start, one of `SOURCES`.  ``parts`` are the parts seen to fly together,
-    None means the whole model.  ``damping`` is the alpha of their momentum [1/time], ``gravity`` the acceleration
-    assumed to be gravity [length/time^2], see `FreeFlight`.  ``doubts`` list contradictions between sources.  For a
-    flight from the energy alone, ``settled`` is the time when the energy had settled; the time from there to ``start``
-    is left unused for safety.  ``described`` is True if one oscillator describes the energy in the flight.
+    If td is not in a flight, this is the last flight before td or, if there is none, the first one after it, and
+    ``refusal`` gives the reason. ``source`` is the evidence for the start, one of `SOURCES`. ``parts`` are the parts
+    that fly together; None stands for the whole model. ``damping`` is the rate alpha at which their momentum decays
+    [1/time]. ``gravity`` is the acceleration that is assumed to be gravity [length/time^2], see `FreeFlight`.
+    ``doubts`` lists contradictions between sources.  For a flight from the energy alone, ``settled`` is the time when
+    the energy had settled; the time from there to ``start`` is left unused for safety.  ``described`` is True if one
+    oscillator describes the energy in the flight.
     """
 
     start: float | None = None
@@ -88,8 +90,8 @@ class Flight(NamedTuple):
     def certain(self) -> bool:
         """Return True if the evidence excludes everything except a free flight.
 
-        A fixed rigid wall does no work and has no contact energy.  Without the momentum, only an oscillator that goes
-        on swinging distinguishes a flight from a crash into such a wall.
+        A fixed rigid wall does no work and has no contact energy.  Without the momentum, only an undisturbed vibration
+        distinguishes a flight from a crash into such a wall.
         """
         if self.unknown_load or (self.source == "given" and self.doubts):
             return False
@@ -104,7 +106,8 @@ class Witness(NamedTuple):
     """A source of evidence for flights in a history, with times (n,), and the function that searches for a flight.
 
     If ``decisive`` is True, the source can exclude a flight at a time even if it shows no flight anywhere.
-    ``explain_contradiction`` returns, for a time at which the momentum alone shows a flight, what speaks against it.
+    ``explain_contradiction`` is called for a time at which only the momentum shows a flight, and returns how this
+    source contradicts the flight, or None.
     """
 
     history: History
@@ -185,7 +188,7 @@ def _find_flight_from_middle(
 class Seen(NamedTuple):
     """Evidence for a td: the flight around td, or the nearest flight and the reason why td is not in a flight.
 
-    ``held`` is True if supports hold the parts, which also overrules a given end of the load.
+    ``held`` is True if supports hold the parts; the parts then do not fly even if the user gives the end of the load.
     """
 
     flight: FreeFlight | None = None
@@ -198,9 +201,10 @@ class Seen(NamedTuple):
 def find_seen_flight(history: History, td: float) -> Seen:
     """Find the free flight around ``td`` [time] from all sources except the internal energy of the parts.
 
-    The best source that shows a flight counts.  A better one that shows none at td is never overruled, and neither is
-    the contact energy.  If two sources show different ends, the later start and the earlier end count.  Parts that are
-    held at td do not fly, whatever the evidence; in a whole model only the parts that nothing holds may fly.
+    The most reliable source that shows a flight is used. A more reliable source that shows no flight at td is never
+    overruled, and neither is the contact energy. If two sources show different ends, the later start and the earlier
+    end are used. Parts that are held at td do not fly, whatever the evidence; in a whole model, only the parts that no
+    support holds may fly.
     """
     held = history.surroundings.held(history.parts, td)
     if held is None:
@@ -276,7 +280,7 @@ def find_all_seen(history: History) -> tuple[tuple[str, FreeFlight], ...]:
 def _can_deny(witness: Witness, flight: FreeFlight) -> bool:
     """Return True if a source may contradict a flight that a more reliable source shows.
 
-    If the parts' own momentum shows a flight, contacts are between these parts or between other parts.
+    If the momentum of the parts shows a flight, any contact acts between these parts or between other parts.
     """
     return witness.source in _AGREEING and flight.parts is None
 
@@ -288,7 +292,7 @@ def list_witnesses(history: History) -> tuple[Witness, ...]:
 
 
 def _make_witnesses(history: History) -> Iterator[Witness]:
-    """Compute the sources of evidence for the flights in a history, from most to least reliable."""
+    """Compute the evidence for the flights in a history, from the most to the least reliable source."""
     if history.momenta:
         from d2rpick.flight import momentum
 
@@ -377,7 +381,7 @@ def _limit_to_undriven(
 ) -> FreeFlight | None:
     """Return the part of a flight shown by the momentum in which no load does work; None if one does at td.
 
-    Opposite forces, and weak ones, drive the model although its momentum hardly shows them.
+    Opposite forces and weak forces may do work on the model although its momentum hardly shows them.
     """
     from d2rpick.flight.work import limit_to_undriven
 
@@ -399,7 +403,7 @@ def _find_flight_by_energies(
 ) -> FreeFlight | None:
     """Return the flight around td from energies; if ``level`` is True, the internal energy must stay on one level.
 
-    Energies alone do not see a fixed wall, which does no work.
+    Energies alone do not show a fixed wall, because it does no work.
     """
     assert history.balance
     flight = look(history.balance, td)
@@ -422,7 +426,7 @@ def _find_flight_by_forces(
 ) -> FreeFlight | None:
     """Return the flight around td from contact forces, limited to a period with one energy level if the energy rises.
 
-    Before the first contact has ended, another kind of load may act, which only the external work shows.
+    Before the end of the first contact, a load of another kind may act, which only the external work shows.
     """
     # Imported here to keep start-up fast.
     from d2rpick.flight.contact_forces import is_deformed
@@ -450,7 +454,7 @@ def _limit_to_level(
 ) -> FreeFlight | None:
     """Limit a flight to the period in which the internal energy stays on one level; None if td is before that period.
 
-    ``momenta`` are those that show the flight.
+    ``momenta`` are the momenta that show the flight.
     """
     if flight is None:
         return None

@@ -1,7 +1,7 @@
 """Fit a free fall to a momentum; gravity and mass-proportional damping are the only forces in it.
 
-Parts that fly together obey p' = g - alpha p in each component, with constant g and one alpha >= 0, so that p(t) = p0 +
-g t - alpha int p dt, which is linear in p0, g and alpha.
+Parts that fly together obey p' = g - alpha p in each component, with constant g and the same alpha >= 0. Therefore p(t)
+= p0 + g t - alpha int p dt, which is linear in p0, g and alpha.
 """
 
 from __future__ import annotations
@@ -70,9 +70,10 @@ _OF_WORK = 2e-3
 class Laws:
     """Laws of free flight for one set of parts: either only gravity and damping act, or no force acts at all.
 
-    A constant net force does not prove gravity, and a push that fades exponentially looks like damping under such a
-    force.  The force is accepted only if it is the mass times one of the deck's accelerations ``gravities`` (0: none
-    acts for a time), or, if these are None, times the gravity of the earth in any consistent units.
+    A constant net force need not be gravity, and together with such a force, an exponentially fading push looks like
+    damping. The force is accepted only if it equals the mass times one of the accelerations ``gravities`` of the deck,
+    which contain 0 if no gravity acts for some time. If ``gravities`` is None, it must equal the mass times the gravity
+    of the earth in any consistent units.
     """
 
     def __init__(
@@ -81,8 +82,10 @@ class Laws:
         """Prepare the laws of free flight for the parts in columns ``members``; ``balance`` limits an unknown mass."""
         time = momenta.time
         momentum = momenta.of(members)
-        self.fit, self.noise = FreeFall(time, momentum), momenta.noise(members)
-        self.balance, self.velocity = balance, momenta.velocity
+        self.fit = FreeFall(time, momentum)
+        self.noise = momenta.noise(members)
+        self.balance = balance
+        self.velocity = momenta.velocity
         self.gravities = momenta.surroundings.gravity_on(
             momenta.parts and [momenta.parts[i] for i in members]
         )
@@ -114,7 +117,7 @@ class Laws:
     def gravity(self, first: int, last: int) -> float | None:
         """Return gravity between two states of a flight [length/time^2]; 0 if there is none, NaN if it is unknown.
 
-        The result is None if the force slows the parts down like a brake, or if the force is not gravity.
+        The result is None if the force is not gravity, or if it only slows the parts down like a brake.
         """
         return None if self._braked(first, last) else self._gravity((first, last))
 
@@ -235,19 +238,21 @@ class Laws:
 
     def _fades_out(self, window: tuple[int, int], weight: Samples) -> bool:
         """Return True if the force in a window minus the ``weight`` (3,) fades and is small at the end."""
-        third = (window[1] - window[0]) // 3
-        at = [window[0], window[0] + third, window[1] - third, window[1]]
+        start, end = window
+        third = (end - start) // 3
+        at = [start, start + third, end - third, end]
         time = self.fit.time[at]
         # Mean force in each third of the window.
         steps = np.diff(time)[:, np.newaxis]
         force = np.diff(self.fit.momentum[at], axis=0) / steps
         first, _, last = np.linalg.norm(force - weight, axis=1)
-        return bool(last <= _FADED * first and last <= _LITTLE * np.linalg.norm(weight))
+        is_faded = last <= _FADED * first
+        return bool(is_faded and last <= _LITTLE * np.linalg.norm(weight))
 
     def _gravity(self, window: tuple[int, int]) -> float | None:
         """Return the acceleration in a window [length/time^2]: 0 if it is negligible, None if it is not gravity.
 
-        NaN if neither the mass nor the work of the force is known.
+        The result is NaN if neither the mass nor the work of the force is known.
         """
         start, end = self.fit.time[[*window]].tolist()
         vector = self.fit.gravity(*window)
@@ -282,8 +287,8 @@ class Laws:
     def _may_be_heavier(self, force: float, start: float, end: float) -> bool:
         """Return True if a force may be the weight of a mass larger than the lower bound implied by the kinetic energy.
 
-        At the state that shows the largest mass, as much kinetic energy may belong to the vibration as the internal
-        energy swings.
+        At the state that shows the largest mass, the kinetic energy of the vibration may be as large as the range of
+        the internal energy.
         """
         balance = self.balance
         squares = np.sum(self.fit.momentum**2, axis=1)
@@ -314,8 +319,9 @@ class Laws:
     def _slowed(self, window: tuple[int, int], force: Samples) -> bool:
         """Return True if a constant force (3,) is friction rather than gravity, because it only slows the parts down.
 
-        The force may have the size of gravity by chance, or because the coefficient of friction is 0.1.  Therefore
-        gravity must act along an axis, and in a straight motion with its value in m, mm, s or ms.
+        The force may have the size of gravity by chance, or because the coefficient of friction is 0.1 and units change
+        gravity by powers of ten. Therefore gravity must act along an axis and, in a straight motion, have its value in
+        units of m or mm and s or ms.
         """
         size = float(np.linalg.norm(force))
         along = force / size
@@ -379,7 +385,7 @@ def _list_gravities_near(
 def is_gravity(acceleration: float, error: float = _ALIKE, decades: int = 1) -> bool:
     """Return True if an acceleration [length/time^2] equals gravity on Earth within a relative error.
 
-    Units of length and time change it by powers of ten, ``decades`` at a time.
+    Other units of length and time change its value by powers of ten; the exponents are multiples of ``decades``.
 
     Examples
     --------
@@ -400,9 +406,9 @@ def find_acceleration_by_work(
 ) -> float | None:
     """Return the acceleration that explains the work done on a momentum [length/time^2].
 
-    The work is the external work, else kinetic plus internal energy.
+    The work is the external work or, if this is not written, the change of kinetic plus internal energy.
 
-    Gravity g does the work int g p dt, whatever part of the model it moves; fixed parts have no momentum.
+    Gravity g does the work int g p dt on the parts that it moves; fixed parts have no momentum and need not be known.
 
     Parameters
     ----------
@@ -415,7 +421,7 @@ def find_acceleration_by_work(
     Returns
     -------
     float or None
-        None if no such energy is written, 0 if they do not follow the momentum.
+        None if no such energy is written; 0 if the energies do not follow the momentum.
     """
     work = balance.kinetic_and_internal if balance.worked is None else balance.worked
     inside = find_window(balance.time, start, end)

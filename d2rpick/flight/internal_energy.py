@@ -1,12 +1,12 @@
 """Find flights from the internal energy if better data are missing, and refine flights found from other energies.
 
-Alone it is poor evidence and never certain, because a mild contact may leave no trace in it.  Therefore the window
-begins late, and ends early if a contact is seen.
+The internal energy alone is poor evidence and never certain, because a mild contact may leave no trace in it. Therefore
+the window begins later than the energy suggests, and ends earlier if the energy shows a contact.
 
-With better evidence the energy must still keep its level, and more must move than the vibration.  A fixed rigid wall
-does no work, so that a crash into it keeps kinetic plus internal energy constant, and two bodies that collide keep
-their momentum.  But pushed parts deform, and parts that spring back gain speed: the internal energy drifts, and the
-total energy does not follow it as it does if damping takes both.
+Even if other evidence shows a flight, the internal energy must keep its level, and there must be motion besides the
+vibration. A fixed rigid wall does no work, so kinetic plus internal energy is constant in a crash into it, and two
+colliding bodies keep their total momentum. But pushed parts deform, and parts that spring back gain speed: the internal
+energy then drifts, and the total energy does not follow it as it would if damping reduced both.
 """
 
 from __future__ import annotations
@@ -66,8 +66,8 @@ _NOT_FROM_MOTION: Final = 0.1
 class QuietTime(NamedTuple):
     """A window in which the energy shows no load [time]; ``end`` is None if the record shows no later contact.
 
-    The window was found around ``td``.  ``settled`` is the time when the energy had settled; the time from there to
-    ``start`` is left unused for safety.
+    The window was found around ``td``. ``settled`` is the time at which the energy had settled; for safety, the time
+    from ``settled`` to ``start`` is not used.
     """
 
     start: float
@@ -125,8 +125,8 @@ def _select_states(history: History, start: float, stop: int) -> slice:
 def find_landing_after(history: History, start: float) -> float | None:
     """Return the first time after ``start`` at which the energy quickly leaves its range so far [time]; otherwise None.
 
-    The energy is compared with the first 3/4 of the time since ``start``, and must exceed their band by the band's
-    width: no vibration goes so far beyond its range of so long a time.
+    The energy is compared with its range in the first 3/4 of the time since ``start``, and must leave this range by
+    more than its width. No vibration exceeds its range over so long a time by so much.
     """
     time, energy = history.between(start, np.inf)
     if time.size < FEWEST:
@@ -153,17 +153,19 @@ def find_landing_after(history: History, start: float) -> float | None:
 def find_end_of_load(history: History, td: float) -> float | None:
     """Return the last time before td at which the energy enters its band, i.e. the end of the load [time].
 
-    The band is that of the last quarter of the record before td, widened by a quarter of its width.  None if the energy
-    was never above the band, so that nothing shows the end of a load, or if its last part leaves the band of the rest,
-    so that something still feeds the parts.
+    The band is the energy range in the last quarter of the record before td, widened by a quarter of its width. The
+    result is None if the energy was never above the band, so that no end of a load is visible. It is also None if the
+    last part of the energy leaves the range of the rest, so that a load still acts on the parts.
     """
     length = td - history.start
     start = td - length / 4
     middle = td - length / 16
     first, first_of_latest = np.searchsorted(history.time, [start, middle])
     after_middle, after_td = np.searchsorted(history.time, [middle, td], side="right")
-    earlier = np.append(history.energy[first:after_middle], history.energy_at(middle))
-    latest = np.append(history.energy[first_of_latest:after_td], history.energy_at(td))
+    earlier = history.energy[first:after_middle]
+    earlier = np.append(earlier, history.energy_at(middle))
+    latest = history.energy[first_of_latest:after_td]
+    latest = np.append(latest, history.energy_at(td))
     if latest.max() > earlier.max() + _BAND_RESERVE * np.ptp(earlier):
         return None
     values = np.append(earlier, latest)
@@ -183,7 +185,8 @@ def _find_last_excursion(history: History, states: slice) -> float | None:
     energy = history.energy[states]
     if energy.size < FEWEST:
         return None
-    low, high = _widen_band(np.quantile(energy, (_OUTER, 1 - _OUTER)), 1.0)
+    usual_range = np.quantile(energy, (_OUTER, 1 - _OUTER))
+    low, high = _widen_band(usual_range, 1.0)
     far = np.flatnonzero((energy < low) | (energy > high))
     return float(history.time[states][far[-1]]) if far.size else None
 
@@ -191,7 +194,7 @@ def _find_last_excursion(history: History, states: slice) -> float | None:
 def _find_last_push(history: History, states: slice, latest: float) -> float | None:
     """Return the time in the given states at which the last unusually fast energy change ends; None if there is none.
 
-    Usual are the rates from the time ``latest`` on.
+    The usual rates of change are those from the time ``latest`` on.
     """
     time = history.time[states]
     if time.size < FEWEST:
@@ -225,9 +228,11 @@ def _find_change_of_level(history: History, states: slice) -> float | None:
     means = (sums[width:] - sums[:-width]) / width
     # The mean with the index ``count`` is the first mean that contains only later states.
     low, high = _widen_band(means[: count - width + 1], 1.0)
-    outside = np.flatnonzero((means[count:] < low) | (means[count:] > high))
+    later_means = means[count:]
+    outside = np.flatnonzero((later_means < low) | (later_means > high))
     if outside.size:
-        return float(history.time[states.stop + int(outside[0]) + width // 2])
+        middle = states.stop + int(outside[0]) + width // 2
+        return float(history.time[middle])
     return None
 
 
@@ -278,15 +283,14 @@ def find_settled_time(
     ----------
     time, energy : array of shape (n,)
     damped : array of shape (k, n), or None
-        Energies that damping lowers.  The level may fall by as much as one of them falls; if there is none, by any
-        amount.
+        Energies that damping reduces. The level may fall by as much as one of them falls; if it is None, by any amount.
     start, end : float
         [time]
     unseen : float
-        Rounding of these energies: the level may fall by it as well [energy].
+        Rounding error of these energies [energy]; the level may also fall by this amount.
     driven : bool
-        The energies grow under a load of unknown size.  A steady push makes a body swing about one level too, so slow
-        swings then do not show a free vibration.
+        True if the energies grow under a load of unknown size. A steady push also makes a body oscillate about a level,
+        so slow oscillations are then no evidence of a free vibration.
     """
     inside = find_window(time, start, end)
     rounding = LAST_DIGIT * float(np.abs(energy).max(initial=0.0))
@@ -320,13 +324,14 @@ def rises_as_it_yields(
 ) -> bool:
     """Return True if an internal energy rises at the start of a flight because a vibrating body yields.
 
-    What is deformed for good stays in the internal energy, so that it rises at once to the level that it keeps later.
+    The energy of permanent deformation remains in the internal energy, which rises at once to the level that it keeps
+    later.
 
     Parameters
     ----------
     time, energy : array of shape (n,)
     whole : array of shape (n,), or None
-        Kinetic and internal energy without the work of gravity; None if they are not written.
+        Kinetic plus internal energy without the work of gravity; None if these are not written.
     start, settled, end : float
         Start and end of the flight, and the time in it from which the energy keeps its level [time].
     """
@@ -368,7 +373,8 @@ def _sum_later_losses(damped: Samples) -> Samples:
 def _find_first_kept(energy: Samples, lost: Samples, least: float) -> int | None:
     """Return the first state after which an energy stays on the level of its last quarter; None if it drifts there.
 
-    What damping still takes after each state, ``lost`` (n,), infinite if unknown, may lie above that level.
+    The energy may exceed this level by ``lost`` (n,), the energy that damping takes after each state; infinite if
+    unknown.
     """
     half = energy.size // 2
     last = 3 * energy.size // 4

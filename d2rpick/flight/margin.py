@@ -33,11 +33,12 @@ _GRAZING_FORCE, _GRAZING_MOMENTUM = 0.01, 0.1
 class Margin(NamedTuple):
     """Time that is kept free before a contact [time], and the source of this time.
 
-    ``source`` is "given", "flight" (3 % of the flight), "landing" (how far a switch may move the landing), "grazing"
-    (the same for a grazing contact) or "no-contact".  ``spread`` is how far a switch may move the landing [time], None
-    if the files do not show it.  ``grazing`` is the quantity that shows a grazing contact, "force" or "momentum", None
-    for any other contact.  ``rotation`` is "any" if the margin allows for any rotation of the body, since nothing shows
-    how it turns, and "unseen" if such a rotation may make the contact earlier but its size is unknown; else None.
+    ``source`` is "given", "flight" (3 % of the flight), "landing" (by how much a switch may shift the landing),
+    "grazing" (the same for a grazing contact) or "no-contact". ``spread`` is the time by which a switch may shift the
+    landing [time]; None if the files do not show it. ``grazing`` is the quantity that shows a grazing contact, "force"
+    or "momentum"; None for any other contact. ``rotation`` is "any" if the margin allows for any rotation of the body,
+    because no file shows how the body rotates. It is "unseen" if such a rotation may make the contact occur earlier but
+    its size is unknown, and None otherwise.
     """
 
     time: float
@@ -65,9 +66,9 @@ def compute_margin(
     given : float, optional
         [time]
     place : float, optional
-        Place error of the body at the contact [length], see `estimate_landing_spread`.
+        Position error of the body at the contact [length], see `estimate_landing_spread`.
     turning : float, optional
-        What the rotation of the body adds to its speed where it touches [length/time], see `estimate_landing_spread`.
+        Speed that the rotation of the body adds at the point of contact [length/time], see `estimate_landing_spread`.
     """
     if given is not None:
         return Margin(given, "given")
@@ -99,10 +100,11 @@ def estimate_landing_spread(
 ) -> float | None:
     """Return by how much a switch may shift the next landing [time], from its velocity error and its position error.
 
-    A body that is out of place by ``place`` [length] reaches the contact earlier by that distance over its speed
-    towards the ground where it touches: the speed of its centre of mass and what its rotation adds, ``turning``
-    [length/time], None if that is unknown.  A surface that does not approach the ground by both grazes it: of a body
-    whose centre of mass still rises, rotation alone brings a corner down.  None if neither error is known.
+    A body that is misplaced by ``place`` [length] reaches the contact earlier by this distance divided by the speed at
+    which the point of contact approaches the ground. This is the speed of the centre of mass plus the speed that the
+    rotation adds, ``turning`` [length/time], which is None if unknown. If the sum is not positive, the surface grazes
+    the ground: for example, rotation alone brings a corner down while the centre of mass still rises. The result is
+    None if neither error is known.
     """
     spread = estimate_spread_of_vibration(history, flight)
     speed = compute_closing_speed(history, flight)
@@ -119,8 +121,8 @@ def estimate_grazing_spread(
 ) -> float | None:
     r"""Return how much earlier a grazing contact may occur [time]; infinite without gravity, None if unknown.
 
-    If surfaces move along each other their closing speed is almost 0, and gravity g alone opens a gap of size e,
-    ``place`` plus the amplitude of the vibration, in the time :math:`\sqrt{2 e / g}`.
+    If surfaces slide along each other, their closing speed is almost 0, and only gravity g closes a gap. For a gap e,
+    which is ``place`` plus the amplitude of the vibration, this takes the time :math:`\sqrt{2 e / g}`.
     """
     spread = estimate_spread_of_vibration(history, flight)
     speed = compute_closing_speed(history, flight)
@@ -173,7 +175,7 @@ def _find_contact(history: History, flight: Flight) -> _Contact | None:
 def is_grazing(history: History, flight: Flight, within: float) -> bool:
     """Return True if the contact that ends a flight stays below 1 % of the largest force for the time ``within``.
 
-    False if the record ends before that, or momenta do not show the force.
+    The result is False if the record ends earlier, or if the momenta do not show the force.
     """
     contact = _find_contact(history, flight)
     if contact is None or flight.end is None:
@@ -191,8 +193,9 @@ def is_grazing(history: History, flight: Flight, within: float) -> bool:
 def changes_momentum_little(history: History, flight: Flight) -> bool:
     """Return True if the contact that ends a flight takes less than 10 % of the approach momentum.
 
-    The contact is over when its force stays below 1 % of the largest one for three states.  The impulse is the change
-    of momentum less gravity.  False if the record ends before that, or momenta do not show the force.
+    The contact is over when its force stays below 1 % of the largest force for three states. The impulse is the change
+    of momentum minus the part due to gravity. The result is False if the record ends earlier, or if the momenta do not
+    show the force.
     """
     contact = _find_contact(history, flight)
     evidence = select_momenta_of_flight(history, flight)
@@ -224,9 +227,9 @@ def changes_momentum_little(history: History, flight: Flight) -> bool:
 def estimate_spread_of_vibration(history: History, flight: Flight) -> float | None:
     r"""Return the time by which the velocity error of a switch may shift the next landing [time].
 
-    A switch takes the velocity of the vibration from all parts, and freezes them away from their rest positions, by the
-    amplitude :math:`a = \sqrt{2 T / m} / \omega` in root mean square.  The centre of mass moves on as before, so that a
-    surface displaced by that amplitude touches the ground earlier or later by
+    A switch removes the velocity of the vibration from all parts, and freezes them away from their rest positions; the
+    rms distance is the amplitude :math:`a = \sqrt{2 T / m} / \omega`. The motion of the centre of mass does not change,
+    so a surface displaced by this amplitude touches the ground earlier or later by
 
     .. math:: \delta t = \frac{a}{v_n} = \frac{1}{\omega} \sqrt{\frac{T}{K_n}}, \quad
         K_n = \frac{m v_n^2}{2} = K\, \frac{(p \cdot n)^2}{p^2}
@@ -236,24 +239,26 @@ def estimate_spread_of_vibration(history: History, flight: Flight) -> float | No
     Parameters
     ----------
     history : History
-        With the energies of the whole model as evidence.
+        Record with the energies of the whole model as evidence.
     flight : Flight
-        With start and end [time].
+        Flight whose start and end are known [time].
 
     Returns
     -------
     float or None
-        :math:`\delta t` [time]; None if kinetic energy or momentum are not written, or other parts move as well.
+        :math:`\delta t` [time]; None if the kinetic energy or the momentum is not written, or if other parts move as
+        well.
 
     Notes
     -----
-    ``T`` is the mean kinetic energy of the vibration, by equipartition the mean internal energy in the flight above its
-    lowest value [energy]. ``omega`` follows from the crossings of the energy with its mean, four per period [1/time].
-    ``K`` is the kinetic energy before the contact [energy], including that of the rotation, which moves the surface to
-    the ground as well. ``n`` is the direction in which gravity has changed the momentum ``p`` of the flying parts,
-    without gravity that of ``p``. Source: the margin before a contact in docs (plan); computed landings moved by at
-    most this, or by 3 % of the flight, see tests/choice/test_windows.py. No margin covers an impact on an edge: 1 um of
-    height moves the landing after it by 70 ms.
+    ``T`` is the mean kinetic energy of the vibration [energy]; by equipartition, it equals the mean of the internal
+    energy in the flight above its lowest value. ``omega`` [1/time] follows from the times at which the energy crosses
+    its mean, four per period. ``K`` is the kinetic energy before the contact [energy], including that of the rotation,
+    which also moves the surface towards the ground. ``n`` is the direction in which gravity has changed the momentum
+    ``p`` of the flying parts or, without gravity, the direction of ``p``. Source: the margin before a contact in docs
+    (plan). In computed runs, landings were shifted by at most this time or 3 % of the flight, see
+    tests/choice/test_windows.py. No margin covers an impact on an edge: a height difference of 1 um shifts the landing
+    after such an impact by 70 ms.
     """
     balance = history.balance
     momentum = _get_momentum_in_flight(history, flight)
@@ -285,7 +290,7 @@ def estimate_spread_of_vibration(history: History, flight: Flight) -> float | No
 def compute_energy_of_approach(history: History, flight: Flight) -> float | None:
     """Return the kinetic energy of the motion along gravity at the end of a flight [energy].
 
-    None if kinetic energy or momentum are not written, or other parts move as well.
+    The result is None if the kinetic energy or the momentum is not written, or if other parts move as well.
     """
     balance = history.balance
     momentum = _get_momentum_in_flight(history, flight)
@@ -331,7 +336,7 @@ def select_momenta_of_flight(
 def find_direction_of_approach(history: History, flight: Flight) -> Samples | None:
     """Return the unit vector (3,) of gravity in a flight or, without gravity, of the motion.
 
-    None if the momentum is not written, or nothing moves.
+    The result is None if the momentum is not written, or if nothing moves.
     """
     momentum_of_body = select_momenta_of_flight(history, flight)
     if momentum_of_body is None:
@@ -345,7 +350,7 @@ def find_direction_of_approach(history: History, flight: Flight) -> Samples | No
 def compute_closing_speed(history: History, flight: Flight) -> float | None:
     """Return the speed along gravity at the end of a flight [length/time]; it is negative for a rising body.
 
-    If there is no gravity, the result is the whole speed.  None if the momentum or the mass is unknown.
+    If there is no gravity, the result is the total speed. It is None if the momentum or the mass is unknown.
     """
     momentum_of_body = select_momenta_of_flight(history, flight)
     if momentum_of_body is None:
@@ -373,7 +378,7 @@ def _compute_share_towards_ground(momentum: Samples) -> float:
 def _find_direction_of_change(momentum: Samples) -> Samples | None:
     """Return the direction in which a momentum (n, 3 or 1) changes, or its own direction if it is constant.
 
-    None if the momentum is 0.
+    The result is None if the momentum is 0.
     """
     change = momentum[-1] - momentum[0]
     largest = float(np.linalg.norm(momentum, axis=1).max())

@@ -1,7 +1,7 @@
 """Find which parts fly together, and when, from their momenta.
 
-A part alone does not fly freely while another part is attached to it and vibrates against it, so the set of parts that
-flies is searched as well.
+A single part does not move freely while an attached part vibrates against it, so the search also determines which set
+of parts flies.
 """
 
 from __future__ import annotations
@@ -69,8 +69,8 @@ def find_flight_around(
 ) -> FreeFlight | None:
     """Find the set of parts that flies freely around ``td`` for clearly the longest time, and the window of its flight.
 
-    Unless the set is given, the chosen parts are tried, these with the parts that move most against them, and all
-    parts.
+    Unless the set is given, three sets are tried: the chosen parts, the chosen parts with the parts attached to them,
+    and all parts.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def find_flight_around(
     td : float
         [time]
     balance : Balance, optional
-        Energies of the model, which show whether gravity works on it if its mass is unknown.
+        Energies of the model, which show whether gravity acts on the model if its mass is unknown.
 
     Returns
     -------
@@ -261,8 +261,8 @@ def can_deny_flight(momenta: Momenta) -> bool:
 def _has_clear_motion(momenta: Momenta, members: Sequence[int], noise: float) -> bool:
     """Return True if a constant momentum with error ``noise`` shows that the chosen parts move rather than rest.
 
-    Heavy parts print coarse numbers, which may hide a load on the chosen parts.  If the chosen parts have no mass, as
-    springs, the members of the set count instead.
+    The momenta of heavy parts are large numbers with coarse last digits, which may hide a load on the chosen parts. If
+    the chosen parts have no mass, as springs do, the members of the set are tested instead.
     """
     parts = momenta.chosen if momenta.values[:, list(momenta.chosen)].any() else members
     change = momenta.change(parts)
@@ -276,7 +276,7 @@ def _has_clear_motion(momenta: Momenta, members: Sequence[int], noise: float) ->
 def _list_sets_to_try(momenta: Momenta, td: float) -> Iterator[tuple[int, ...]]:
     """Yield the sets of parts to try: the chosen parts, the chosen and attached parts, and all moving parts.
 
-    If all parts are chosen, the user chose none; then parts that something carries are left out.
+    If all parts are chosen, i.e. the user chose none, supported parts are left out.
     """
     chosen = tuple(momenta.chosen)
     yield chosen
@@ -297,8 +297,9 @@ def _find_attached_parts(
 ) -> tuple[int, ...]:
     """Return the attached parts, whose deviations of momentum from straight lines cancel out before td.
 
-    Forces within a body that flies cancel: the sum of its parts' momenta is straight.  Such sums form the null space of
-    the bent momenta, and its projector groups the parts of a body.
+    Internal forces of a flying body cancel out, so the sum of its part momenta is a straight line over time. Such sums
+    form the null space of the deviations of the part momenta from straight lines, and its projector groups the parts of
+    a body.
     """
     time = momenta.time
     back = (time >= td - _LOOK_BACK * (time[-1] - time[0])) & (time <= td)
@@ -339,7 +340,8 @@ def _refine_attached_parts(
     free = [i for i in moving if i not in chosen]
     while free:
         sides = np.array([-1.0 if i in members else 1.0 for i in free])
-        sizes = np.linalg.norm(total + sides[:, np.newaxis] * rests[free], axis=1)
+        changes = sides[:, np.newaxis] * rests[free]
+        sizes = np.linalg.norm(total + changes, axis=1)
         best = int(np.argmin(sizes))
         if sizes[best] >= (1 - _ROUNDED) * np.linalg.norm(total):
             break
@@ -356,7 +358,7 @@ def replace_words_by_part_ids(run: OpenedRun, selection: Selection) -> Selection
     Raises
     ------
     FormatError
-        If the run has no parts with energies, or does not show which of them fly together.
+        If the run has no parts with energies, or does not show which parts fly together.
 
     Examples
     --------
@@ -394,9 +396,9 @@ def list_deformable_parts(run: OpenedRun) -> tuple[Part, ...]:
 def find_flying_parts(run: OpenedRun) -> tuple[Part, ...]:
     """Return the deformable parts that fly as one body; raise FormatError if the momenta do not show them.
 
-    Of all sets that fly, the one with the largest product of mass and time counts: a loose tyre may fly longer than the
-    car, which is the body to be switched.  The parts that the deck connects are tried; if there is no deck, or if none
-    of these flies by itself, the sets of `flying_together`.
+    Of all sets that fly, the set with the largest product of mass and flight time is used, because a loose tyre may fly
+    longer than the car that is to be switched. The sets of parts that the deck connects are tried first. If there is no
+    deck, or if none of these sets flies, the sets are those of `find_parts_flying_together`.
     """
     deformable, momenta = _get_parts_and_momenta(run)
     flights = (
@@ -414,7 +416,8 @@ def find_flying_parts(run: OpenedRun) -> tuple[Part, ...]:
 def find_parts_flying_together(run: OpenedRun) -> tuple[Part, ...]:
     """Return the deformable parts that fly together in one or more bodies; raise FormatError if there are none.
 
-    All parts are tried together, then each part that is in no set yet, with the parts attached to it.
+    First each part that is not yet in a set is tried with the parts attached to it. Then all parts are tried together,
+    and finally the sets of `_list_cores`.
     """
     deformable, momenta = _get_parts_and_momenta(run)
     flights: list[FreeFlight] = []
@@ -429,10 +432,10 @@ def find_parts_flying_together(run: OpenedRun) -> tuple[Part, ...]:
 
 
 def _list_cores(momenta: Momenta) -> Iterator[tuple[int, ...]]:
-    """Yield the sets of parts attached to the heaviest part at various times, without parts that slide at that time.
+    """For each of several times, yield the parts attached to the heaviest part, except those that slide at this time.
 
-    A part that moves straight, such as a sliding loose wheel, bends no sum, and would otherwise pass for a part of the
-    body.
+    A part that moves at constant velocity, such as a loose sliding wheel, does not disturb any sum, so it would
+    otherwise be treated as a part of the body.
     """
     masses = momenta.masses
     heavy_members = [i for i in momenta.chosen if masses is not None and masses[i] > 0]
@@ -513,7 +516,7 @@ def find_complete_stretches(
 ) -> tuple[slice, ...]:
     """Return the ranges of states in which the part momenta add up to the momentum of the ``whole`` model.
 
-    In the other states a rigid body has absorbed some parts, and no part quantity is used.
+    In all other states, a rigid body has absorbed some parts, so the quantities of the parts are not used.
     """
     return find_stretches(is_complete(momenta, whole), FEWEST)
 
@@ -527,11 +530,10 @@ def is_complete(
     """
     if whole is None or whole.velocity or whole.time.size != momenta.time.size:
         return np.ones(momenta.time.size, np.bool_)
-    everything = range(momenta.values.shape[1])
-    largest = np.maximum(
-        np.maximum.accumulate(np.abs(whole.values[:, 0]).max(axis=1)), before
-    )
-    difference = np.abs(momenta.of(everything) - whole.values[:, 0]).max(axis=1)
-    return np.asarray(
-        difference <= _ALL_OF_IT * largest + 2 * momenta.noise(everything)
-    )
+    all_parts = range(momenta.values.shape[1])
+    of_model = whole.values[:, 0]
+    so_far = np.maximum.accumulate(np.abs(of_model).max(axis=1))
+    largest = np.maximum(so_far, before)
+    difference = np.abs(momenta.of(all_parts) - of_model).max(axis=1)
+    limit = _ALL_OF_IT * largest + 2 * momenta.noise(all_parts)
+    return np.asarray(difference <= limit)

@@ -1,12 +1,13 @@
 """Compute by how much a body is misplaced at td because its moving parts were frozen in a different position.
 
-A part that moves against the rest, such as an engine on its mounts, is frozen where it is at tr.  The centre of mass
-flies as without switching, so the rest of the body is displaced by the part's fraction of the mass times the part's
-relative displacement from tr to td, in the frame that turns with the body (docs/explanation/position-error.md).
-Displacements come from the velocities of the parts, their momenta over their masses.
+A part that moves relative to the other parts, such as an engine on its mounts, is frozen in its position at tr. The
+motion of the centre of mass does not change, so the rest of the body is displaced by the part's fraction of the mass
+times the part's relative displacement from tr to td, in the frame that rotates with the body
+(docs/explanation/position-error.md). Displacements are integrals of the part velocities, i.e. of the momenta divided by
+the masses.
 
-Each of several rigid bodies has its own error, and the largest counts.  A body of a single part moves as the part does:
-its momentum is kept, and nothing in it is frozen elsewhere.
+If there are several rigid bodies, the largest of their errors is used. A body that consists of a single part has no
+error, because its momentum does not change and no part of it is frozen in a different position.
 """
 
 from __future__ import annotations
@@ -57,21 +58,22 @@ class Drift:
     Attributes
     ----------
     time : array of shape (n,)
-        Of the states in flight [time].
+        Times of the states in the flight [time].
     place : array of shape (n, 3)
-        Of the body against where a rigid body would be, in the frame that turns with it, up to a constant [length].
+        Displacement of the body relative to a rigid body, in the frame that rotates with the body, up to a constant
+        [length].
     path : array of shape (n,)
-        Distance that the centre of mass has flown [length].
+        Distance that the centre of mass has travelled [length].
     part : Part
-        The part that moves against the others; if there are several, the one with the largest effect.
+        The part that moves relative to the others; if there are several, the one with the largest effect.
     doubt : float
-        Possible error of the differences, since the others are not exactly one rigid body [length].
+        Possible error of displacement differences, because the other parts are not exactly one rigid body [length].
     turning : Turning or None
-        How the body turns, if a deck gives the places of its parts.
+        Rotation of the body; None unless a deck contains the positions of its parts.
     moving : tuple of int
-        Numbers of all parts that move against the others.
+        Indices of all parts that move relative to the others.
     slow : bool
-        True if they swing for less than a period: most of that looks like the rotation.
+        True if they oscillate for less than a period, so that most of their motion looks like rotation of the body.
     """
 
     def __init__(
@@ -91,8 +93,9 @@ class Drift:
     def at_least(self) -> bool:
         """Return True if errors and angles are lower bounds, because internal motion looks like motion of the body.
 
-        This happens if the part moves slowly, or if the motion of the others turns their frame by more than
-        the body's own angle, or, if there is no deck, moves them by a notable fraction of the part's motion.
+        This is the case if the part oscillates slowly, or if the deformation of the other parts turns their frame by
+        more than the body rotates. Without a deck, it is the case if the deformation of the other parts is a notable
+        fraction of the part's motion.
         """
         moved = float(
             np.sqrt(
@@ -109,8 +112,8 @@ class Drift:
     def errors(self, tr: Samples, td: float) -> Samples:
         """Return the position errors of the body at td for tr (k,) [length]; NaN outside the flight.
 
-        If the deck shows how the body turns, the largest distance at the watched nodes is used, else that of the centre
-        of mass.
+        If the deck shows how the body rotates, the error is the largest distance at the watched nodes, otherwise that
+        at the centre of mass.
         """
         if self.turning:
             return self._inside(tr, td, self.turning.offsets(tr, td))
@@ -123,7 +126,8 @@ class Drift:
     def errors_at_contact(self, tr: Samples, direction: Samples | None) -> Samples:
         """Return the position errors at the contact that ends the flight for tr (k,) [length]; NaN outside the flight.
 
-        With a unit vector (3,) towards the contact, the errors of the node that touches first count if they are larger.
+        If a unit vector (3,) towards the contact is given, the errors of the node that touches first are used if they
+        are larger.
         """
         end = float(self.time[-1])
         errors = self.errors(tr, end)
@@ -161,22 +165,22 @@ def find_drift(
 ) -> Drift | None:
     """Find by how much a flying body is displaced from the rigid body that replaces it.
 
-    The parts that move against the others are those without which the others are most nearly one rigid body turning at
-    a constant rate; together they have at most half of the mass.
+    The moving parts are chosen so that the other parts most nearly form one rigid body that rotates at a constant rate;
+    together they have at most half of the mass.
 
     Parameters
     ----------
     seen : Flying
     placement : Placement, optional
-        Places of the parts according to the deck, which show how the body turns.
+        Positions of the parts according to the deck, which show how the body rotates.
     displacements : function, optional
-        Reads the displacements of nodes, which show it if the parts do not.
+        Reads the displacements of nodes, which show the rotation if the parts do not.
 
     Returns
     -------
     Drift or None
-        None if it is unknown: a mass is unknown, there are fewer than three parts, or two with almost no mass beside
-        the third, or the others are far from one rigid body and no deck shows how they turn.
+        None if the displacement is unknown: a mass is unknown; there are fewer than three parts, or two of three have
+        almost no mass; or the other parts are far from one rigid body and no deck shows how they rotate.
     """
     momenta, masses, inside = (
         seen.momenta,
@@ -258,7 +262,8 @@ def find_drift_in_flight(
 ) -> Drift | None:
     """Find the displacement, in a flight, of the body that consists of ``parts`` or of the parts to be switched.
 
-    None also if the momenta of single parts do not show the flight.  ``placement`` comes from the deck.
+    The result is also None if the part momenta do not show the flight. ``placement`` contains the part positions in the
+    deck.
     """
     flying = _collect_flying(history, flight, parts)
     if flying is None:
@@ -271,7 +276,8 @@ def find_parts_apart(
 ) -> tuple[Part, ...]:
     """Return those of ``parts`` (by default, of the parts to be switched) that separate from the others in the flight.
 
-    The velocity of such a part against the others is constant; that of a part of a body vibrates and turns.
+    The velocity of such a part relative to the others is constant, whereas that of a connected part oscillates and
+    rotates.
     """
     flying = _collect_flying(history, flight, parts)
     if flying is None or flying.momenta.parts is None:
@@ -331,7 +337,7 @@ def _collect_flying(
 class RigidBody(NamedTuple):
     """Ids of the parts that become one rigid body; ``whole`` is False for a single part in disconnected pieces.
 
-    No file shows how such pieces move against each other.
+    No file shows how such pieces move relative to each other.
     """
 
     parts: tuple[int, ...]
@@ -346,8 +352,8 @@ class RigidBody(NamedTuple):
 class Off(NamedTuple):
     """Largest position error of a body [length], and its cause; ``body`` is empty if there is only one body.
 
-    ``assumed`` is True if no deck shows that the parts become one body.  ``at_least`` is True if the error may be
-    larger.
+    ``assumed`` is True if the parts are only assumed to become one body, because there is no deck. ``at_least`` is True
+    if the error is a lower bound.
     """
 
     error: float
@@ -363,10 +369,11 @@ class Off(NamedTuple):
 
 
 class Bodies:
-    """Rigid bodies in a flight with their displacements; a single body is assumed if the deck defines none (``told``).
+    """Rigid bodies in a flight with their displacements; a single body is assumed unless a deck defines them.
 
-    If one displacement is unknown the error is unknown too, since it may be the largest.  ``apart`` are parts that are
-    to become one body with others but fly away from them, and ``staying`` the other moving parts, if any are apart.
+    If one displacement is unknown, the error is unknown too, because this displacement may be the largest. ``apart``
+    contains the parts that are to become one body with others but separate from them. If there are any, ``staying``
+    contains the other moving parts.
     """
 
     def __init__(
@@ -397,7 +404,8 @@ class Bodies:
     ) -> float | None:
         """Return the largest position error at the contact that ends the flight, over tr (k,) and bodies [length].
 
-        ``direction`` is a unit vector (3,) towards the contact.  None if an error is unknown, or all tr lie outside.
+        ``direction`` is a unit vector (3,) towards the contact. The result is None if an error is unknown, or if all tr
+        lie outside the flight.
         """
         if not self._complete:
             return None
@@ -417,7 +425,8 @@ class Bodies:
     def compute_speed_at_front(self, direction: Samples) -> float | None:
         """Return the speed along a unit vector (3,) that rotation adds at the point of a body farthest along it.
 
-        Of several bodies the least counts [length/time]; None if a deck does not show how each of them turns.
+        For several bodies, the result is the smallest speed [length/time]. It is None if the rotation of any body is
+        unknown.
         """
         turnings = [drift.turning for drift in self._known if drift.turning]
         if not self._complete or len(turnings) < len(self._known):
@@ -459,11 +468,11 @@ def find_bodies_in_flight(
     ----------
     history : History
     flight : Flight
-        With the parts that fly in it.
+        Flight with the parts that fly in it.
     told : sequence of RigidBody or None
-        According to a deck; if there is no deck, the parts are assumed to become one body.
+        Bodies that the deck defines; if there is no deck, the parts are assumed to become one body.
     placement : Placement, optional
-        Places of the parts according to the deck.
+        Positions of the parts according to the deck.
     """
     if not told:
         away = find_parts_apart(history, flight)

@@ -1,8 +1,8 @@
 """Find the steady rotation of a flying body from the displacements of its parts relative to its centre.
 
-In a body that turns at a constant rate each part moves on a circle.  Displacements less these circles are the motion of
-the parts against each other, in a frame that turns with the body.  The moving parts are those without which the others
-are most nearly one rigid body.
+In a body that rotates at a constant rate, each part moves on a circle. The displacements minus these circles are the
+motion of the parts relative to each other, in a frame that rotates with the body. The moving parts are chosen so that
+the other parts most nearly form one rigid body.
 """
 
 from __future__ import annotations
@@ -56,16 +56,16 @@ def _fit_steady_rotation(
     time : array of shape (n,)
         [time]
     ways : array of shape (n, parts, 3)
-        Displacements against the centre of mass, up to a constant each [length].
+        Displacements relative to the centre of mass, each up to a constant [length].
     masses : array of shape (parts,)
         [mass]
     least : float
-        Displacements whose sum of m r^2 over parts and states is smaller show no rotation [mass length^2].
+        Smallest sum of m r^2 over parts and states for which displacements can show a rotation [mass length^2].
 
     Returns
     -------
     rate : array of shape (3,)
-        Of the body's rotation [rad/time]; 0 if no rotation explains three quarters of the displacements.
+        Angular velocity of the body [rad/time]; 0 if no rotation explains three quarters of the displacements.
     rest : float
         Sum of m r^2 over parts and states that the rotation does not explain [mass length^2].
     """
@@ -115,7 +115,7 @@ def _fit_steady_rotation(
 def subtract_circles(time: Samples, ways: Samples, rate: Samples) -> Samples:
     """Return the displacements (n, parts, 3) in the rotating frame, minus their mean and the circular motion.
 
-    The circle of each part is the one that leaves least, since its arm, the place at the start, is unknown.
+    The circle of each part is fitted by least squares, because its arm (the position at the start) is unknown.
     """
     frame = _rotate_frame(time, rate)
     turned = ways @ frame
@@ -130,8 +130,9 @@ def subtract_circles(time: Samples, ways: Samples, rate: Samples) -> Samples:
 def count_periods(time: Samples, left: Samples, rate: Samples) -> float:
     """Return the number of periods of the harmonic motion that best fits the unexplained displacement.
 
-    A motion of less than a period looks like an arc, so the subtracted circle took most of it.  Therefore a circle is
-    subtracted from each trial motion before it is compared with ``left`` (n, 3).  Infinite if none explains half of it.
+    A motion of less than a period looks like an arc, so subtracting a circle has removed most of it. Therefore a circle
+    is also subtracted from each trial motion before it is compared with ``left`` (n, 3). The result is infinite if no
+    trial motion explains half of ``left``.
     """
     wanted = (left - left.mean(axis=0)).ravel()
     least_misfit = 0.5 * float(wanted @ wanted)
@@ -179,8 +180,8 @@ def _compute_least_displacements(ways: Samples, masses: Samples) -> Samples:
 def _estimate_least_rests(time: Samples, ways: Samples, masses: Samples) -> Samples:
     """Estimate, for each omitted part, the sum of m r^2 of the other parts that no rotation explains, shape (parts,).
 
-    In a rotation the velocity is rate x displacement, so that displacements less their straight lines are rate x their
-    integrals: linear in the rate, with normal equations from which one part is easily removed.
+    In a rotation, the velocity is rate x displacement. Therefore the displacements minus straight lines are rate x
+    their integrals. This is linear in the rate, and each part can easily be removed from the normal equations.
     """
     square, right_side, normal = (
         _sum_without_each(term, masses)
@@ -202,7 +203,7 @@ def _sum_without_each(terms: Samples, masses: Samples) -> Samples:
 def _list_linear_terms(
     time: Samples, ways: Samples, masses: Samples
 ) -> tuple[Samples, Samples, Samples]:
-    """Return each part's least-squares system: squares (parts,), right-hand side (parts, 3), matrix (parts, 3, 3)."""
+    """Return the normal equations of each part: squares (parts,), right side (parts, 3), matrix (parts, 3, 3)."""
     flat = ways.reshape(time.size, -1)
     bent_places, arm = (
         remove_line(time, values).reshape(ways.shape)

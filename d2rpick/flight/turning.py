@@ -1,18 +1,18 @@
 """Compute how a body that is rigid from tr to td rotates relative to the deformable body of the reference run.
 
-Both keep their angular momentum L.  In the frame of the body, with the places y of its parts about the centre of mass
-of all that flies, the tensor of inertia I and w = I^-1 L,
+Both bodies keep their angular momentum L. In the frame of the body, let y be the positions of its parts relative to the
+centre of mass of all flying parts, I the inertia tensor, and w = I^-1 L. The angular velocities are
 
     deformable:  w = I(t)^-1 (L - h),  h = sum m y x dy/dt        rigid:  w = I(tr)^-1 L.
 
-To first order in their difference psi, an angle,
+To first order, the angle psi between both bodies obeys
 
     dpsi/dt + w x psi + I^-1 (psi x L) = I^-1 [(I(t) - I(tr)) w + h],
 
-where of I(t) - I(tr) and h only the parts count that become rigid.  It is linear, so that one pass over the flight
-serves every tr and td.  Parts are points with an inertia of their own that turns with the body: a part that rocks on
-its mounts is not seen.  Places come from where the deck puts the parts, and their momenta since.  If the parts of the
-body lie on a line, or the record begins later than the run, nodes whose motion is written show the frame.
+where I(t) - I(tr) and h contain only the parts that become rigid. The equation is linear, so it is integrated once over
+the flight for all tr and td. Parts are points with inertias that rotate with the body, so a part that rocks on its
+mounts is not detected. Positions are those in the deck plus the integrals of the part velocities. If the parts of the
+body lie on a line, or if the record does not begin with the run, nodes whose motion is written determine the frame.
 """
 
 from __future__ import annotations
@@ -46,13 +46,13 @@ _LAST: Final = 10
 class Turning(NamedTuple):
     """Rotation of a body, integrated over a flight: arrays over ``time`` (n,), in the frame of the body.
 
-    ``place`` (n, 3) is the body's displacement against the centre of mass of all flying parts, as far as the parts that
-    become rigid cause it; ``arm`` (n, 3) leads from there to the points where errors are evaluated [length];
-    ``inertia`` (n, 3, 3) belongs to those parts; ``carried`` (n, 3, 3), ``pushed`` (n, 3) and ``kept`` (n, 3, 3, 3)
-    solve the equation of psi.  ``doubt`` is the angle by which bending of the body turns its frame from one time to
-    another [rad].  ``nodes`` (k, 3) are those of the parts that become rigid at the last time, against the centre of
-    mass [length], and ``rate`` (3,) is the angular velocity there [rad/time]; both have the axes of the deck, to which
-    ``frame`` (3, 3) rotates those of the body.
+    ``place`` (n, 3) is the displacement of the body relative to the centre of mass of all flying parts, as far as the
+    parts that become rigid cause it [length]. ``arm`` (n, 3) leads from there to the points at which errors are
+    evaluated [length]. ``inertia`` (n, 3, 3) is that of the parts that become rigid. ``carried`` (n, 3, 3), ``pushed``
+    (n, 3) and ``kept`` (n, 3, 3, 3) are the solution of the equation of psi. ``doubt`` is the angle by which bending of
+    the body may turn its frame between two times [rad]. ``nodes`` (k, 3) are the positions of the nodes of these parts
+    at the last time, relative to the centre of mass [length]. ``rate`` (3,) is the angular velocity at the last time
+    [rad/time]. Both refer to the axes of the deck, to which ``frame`` (3, 3) rotates the axes of the body.
     """
 
     time: Samples
@@ -70,8 +70,8 @@ class Turning(NamedTuple):
     def compute_speed_at_front(self, direction: Samples) -> float:
         """Return the speed along a unit vector (3,) that the rotation gives to the node farthest along this vector.
 
-        That node touches a plane ahead first, at the last time; its whole speed is that of the centre of mass and this
-        one [length/time].
+        At the last time, this node is the first to touch a plane ahead. Its total speed is that of the centre of mass
+        plus the result [length/time].
         """
         front = self._find_front(direction)
         return float(np.cross(self.rate, front) @ direction)
@@ -121,8 +121,8 @@ class Turning(NamedTuple):
 class Flying(NamedTuple):
     """Parts in a flight from ``start`` to ``end`` [time]: part ``momenta`` and ``masses`` (parts,).
 
-    A mass is NaN if it is unknown.  ``members`` are the columns of the parts that become one rigid body, ``others``
-    those of all parts that fly with them, which the moving parts displace too.
+    A mass is NaN if it is unknown. ``members`` contains the columns of the parts that become one rigid body. ``others``
+    contains those of all parts that fly with them, because the moving parts displace these parts, too.
     """
 
     momenta: Momenta
@@ -136,8 +136,9 @@ class Flying(NamedTuple):
 class _FlyingParts(NamedTuple):
     """Flying parts whose masses and positions in the deck are known.
 
-    ``columns`` are their columns in the momenta; ``masses`` (parts,), ``centres`` (parts, 3) [length] and ``spreads``
-    (parts, 3, 3), the second moments of a unit mass about the centre [length^2], have the same order.
+    ``columns`` contains their columns in the momenta. ``masses`` (parts,), ``centres`` (parts, 3) [length] and
+    ``spreads`` (parts, 3, 3) have the same order; ``spreads`` contains the second moments about the centre per unit
+    mass [length^2].
     """
 
     columns: list[int]
@@ -154,7 +155,7 @@ class _FlyingParts(NamedTuple):
 class _BodyMotion(NamedTuple):
     """Motion of the flying parts at times ``time`` (n,): the body ``frame``, and the ``places`` (n, parts, 3) in it.
 
-    The places are relative to the centre of mass of all that flies [length].
+    The places are relative to the centre of mass of all flying parts [length].
     """
 
     time: Samples
@@ -180,8 +181,9 @@ def follow_turning(
 ) -> Turning | None:
     """Follow the orientation of the body that the given parts form, from the deck positions of all flying parts.
 
-    ``moving`` are the columns of the parts that move against the others.  None if a mass or a place is unknown, or
-    neither the parts of the body nor nodes whose ``displacements`` are written determine its orientation.
+    ``moving`` contains the columns of the parts that move relative to the others. The result is None if a mass or a
+    position is unknown, or if neither the parts of the body nor nodes whose ``displacements`` are written determine its
+    orientation.
     """
     momenta = seen.momenta
     assert momenta.parts is not None
@@ -300,19 +302,21 @@ def _integrate_velocities(
 ) -> Samples:
     """Return how far the parts in these columns have moved since the start of the run, shape (n, parts, 3) [length].
 
-    The velocity before the first state is the one of that state.
+    The velocity before the first state is assumed to be that of the first state.
     """
     velocity = momenta.values[:, members] / mass[:, np.newaxis]
     time = momenta.time
     since = integrate_by_trapezia(time, velocity.reshape(time.size, -1))
-    return np.asarray(velocity[0] * time[0] + since.reshape(velocity.shape))
+    before = velocity[0] * time[0]
+    return np.asarray(before + since.reshape(velocity.shape))
 
 
 def _place_by_frames(centre: Samples, since: Samples, frames: Samples) -> Samples:
     """Return the positions of parts during a section of the run, up to a common displacement, shape (n, parts, 3).
 
-    Their motion ``since`` (n, parts, 3) is known.  In the mean over the flight each part is where the deck puts it in
-    the frame of the body: a part that vibrates on its mounts does so about its place.
+    ``since`` (n, parts, 3) is the motion of the parts since the start of the section. The mean position of each part
+    over the flight, in the frame of the body, is assumed to be its position in the deck, because a part on mounts
+    vibrates about it.
     """
     in_frame = np.einsum("nij,pj->npi", frames, centre)
     return np.asarray(since + (in_frame - since).mean(axis=0))
@@ -330,7 +334,7 @@ def _solve_turning(
 ) -> tuple[Samples, Samples, Samples]:
     """Solve the equation of the rotation error psi; return propagation matrix, particular solution and inertia effect.
 
-    ``frames`` (n, 3, 3) are those of the body, ``everything`` is all that flies and ``rigid`` the parts that become
+    ``frames`` (n, 3, 3) are the axes of the body. ``everything`` contains all flying parts, ``rigid`` those that become
     rigid.
     """
     steps = np.diff(time)[:, np.newaxis]
@@ -371,8 +375,10 @@ def _integrate_matrix(time: Samples, slope: Samples) -> Samples:
     """Return the solution (n, 3, 3) of X' = slope X that starts from the identity matrix."""
     rotations = [np.eye(3)]
     unit = np.eye(3)
-    for step in _take_middle_values(slope) * np.diff(time)[:, np.newaxis, np.newaxis]:
-        rotations.append((unit + step + step @ step / 2) @ rotations[-1])
+    intervals = np.diff(time)[:, np.newaxis, np.newaxis]
+    for step in _take_middle_values(slope) * intervals:
+        increment = unit + step + step @ step / 2
+        rotations.append(increment @ rotations[-1])
     return np.stack(rotations)
 
 
@@ -385,7 +391,8 @@ def _compute_turns(frames: Samples) -> Samples:
     size = np.linalg.norm(sine, axis=1, keepdims=True)
     is_turned = size > 0
     angle = np.arcsin(np.minimum(size, 1.0))
-    angle_over_sine = np.where(is_turned, angle / np.where(is_turned, size, 1.0), 1.0)
+    divisor = np.where(is_turned, size, 1.0)
+    angle_over_sine = np.where(is_turned, angle / divisor, 1.0)
     return np.asarray(sine * angle_over_sine)
 
 
@@ -418,6 +425,7 @@ def _interpolate_at(time: Samples, values: Samples, when: Samples) -> Samples:
     """Return values (n, ...) at times (k,), interpolated linearly."""
     next_state = np.clip(np.searchsorted(time, when), 1, time.size - 1)
     last_state = next_state - 1
-    share = (when - time[last_state]) / (time[next_state] - time[last_state])
+    interval = time[next_state] - time[last_state]
+    share = (when - time[last_state]) / interval
     share = share.reshape(-1, *[1] * (values.ndim - 1))
     return np.asarray(values[last_state] * (1 - share) + values[next_state] * share)

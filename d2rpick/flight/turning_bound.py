@@ -1,7 +1,7 @@
 """Bound the speed that rotation may add at the point of contact if no file shows how the body rotates.
 
-The kinetic energy of a body less that of its centre of mass is the energy of its vibration and of its rotation, and
-the latter is the same in all states of a flight.  Its least value therefore bounds the rotation.
+The kinetic energy of a body minus that of its centre of mass is the kinetic energy of its vibration and its rotation.
+The rotational energy is the same in all states of a flight, so the smallest value of the sum is an upper bound of it.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ def bound_turning_speed(
 ) -> float | None:
     r"""Return the largest speed that rotation can give to any node of the flying parts [length/time].
 
-    With the energy E of the rotation, the inertia I and the place r of a node about the centre of mass, the speed of
-    the node along a unit vector n is (r x n) w, so that
+    Let E be the rotational energy, I the inertia tensor, w the angular velocity, and r the position of a node relative
+    to the centre of mass. The speed of the node along a unit vector n is (r x n) w, so that
 
     .. math:: v \le \sqrt{2 E\, (r \times n)^T I^{-1} (r \times n)}
 
-    whatever w is.  The largest value over all nodes and directions counts.  None if the momenta of parts, their places
-    in the deck or the kinetic energy are unknown.
+    for any w. The result is the largest value over all nodes and directions. It is None if the part momenta, the
+    positions of the parts in the deck, or the kinetic energy are unknown.
     """
     evidence = select_momenta_of_flight(history, flight)
     if evidence is None or evidence[0].parts is None or flight.parts is None:
@@ -49,8 +49,8 @@ def bound_turning_speed(
 def may_turn_back(history: History, flight: Flight) -> bool:
     """Return True if the rotational energy may move parts away from the ground as fast as the body approaches it.
 
-    Parts at the radius of gyration then have the speed of the centre of mass; those outside are faster.  False if the
-    files do not show it.
+    The rotation then moves parts at the radius of gyration as fast as the centre of mass, and parts outside even
+    faster. The result is False if the files do not show the energies.
     """
     evidence = select_momenta_of_flight(history, flight)
     energy = _bound_energy_of_rotation(history, flight)
@@ -64,7 +64,8 @@ def may_turn_back(history: History, flight: Flight) -> bool:
 def _bound_energy_of_rotation(history: History, flight: Flight) -> float | None:
     """Return an upper bound on the rotational energy in a flight [energy]; None if masses or energies are unknown.
 
-    If only the kinetic energy of the model is written it serves, since that of the flying parts is not larger.
+    If only the kinetic energy of the model is written, it is used instead, because that of the flying parts is not
+    larger.
     """
     evidence = select_momenta_of_flight(history, flight)
     kinetic = history.evidence.kinetic_energy(flight.parts)

@@ -35,7 +35,7 @@ def find_vibrating_parts(history: History, flight: Flight) -> Beside:
     ----------
     history : History
     flight : Flight
-        The flight with all parts that fly together; if neither it nor a table names parts, the result is empty.
+        Flight with all parts that fly together; if neither the flight nor a table names parts, the result is empty.
     """
     not_chosen = _list_parts_not_chosen(history, flight)
     energies = history.evidence.internal_energies(not_chosen) if not_chosen else None
@@ -76,12 +76,12 @@ def extract_kinetic_energy(
     Returns
     -------
     time, energy : array of shape (n,), or None
-        Within the flight [time], [energy]; None if no file contains it.
+        States in the flight [time], [energy]; None if no file contains this energy.
 
     Notes
     -----
-    The kinetic energy of the centre of mass is a quadratic function of time under constant gravity; what deviates from
-    it, as under damping, is as slow. Neither has a line.
+    Under constant gravity, the kinetic energy of the centre of mass is a quadratic function of time; damping changes it
+    only slowly. Neither causes a spectral line.
     """
     kinetic = history.evidence.kinetic_energy(flight.parts)
     if kinetic is None:

@@ -51,9 +51,9 @@ _MOST_SHRINKS = 8
 class FreeFlight(NamedTuple):
     """A window in which ``parts`` fly freely together [time]; None stands for the whole model.
 
-    ``end_seen`` is False if the record ends during the flight.  ``damping`` is alpha, the decay rate of the momentum
-    [1/time].  ``gravity`` is the acceleration taken as gravity: 0 if there is none, NaN if nothing but its constancy
-    shows it, infinite if energies grow under a load of unknown size [length/time^2].
+    ``end_seen`` is False if the record ends during the flight. ``damping`` is alpha, the decay rate of the momentum
+    [1/time]. ``gravity`` is the acceleration that is assumed to be gravity [length/time^2]: 0 if there is none, NaN if
+    its only evidence is a constant force, and infinite if energies grow under a load of unknown size.
     """
 
     start: float
@@ -83,7 +83,7 @@ class FreeFlight(NamedTuple):
 class Law:
     """A law of free flight over ``time`` (n,), and the deviation of a record from this law.
 
-    The misfit of each window is computed once: neighbouring times ask for the same windows.
+    The misfit of each window is kept, because searches from neighbouring times need the same windows.
     """
 
     def __init__(self, time: Samples) -> None:
@@ -133,18 +133,19 @@ def find_lasting_window(
     td : float
         [time]
     extent, noise : float
-        Range over the record, and the error of printed digits, in the unit of the misfit.
+        Range of the quantity over the record, and the error of its printed digits [unit of the misfit].
     fades : bool
-        Continue to finer limits, because a smoothly fading load is visible only at these.
+        Continue to stricter tolerances, because only they reveal a smoothly fading load.
     enough : float
-        Fraction of the range that a window may leave although it still shrinks.
+        Largest misfit of a window that still shrinks at one end, as a fraction of the range [-].
     rings : bool
-        Accept a window whose misfit is as large in its middle, as that of a vibration is.
+        Accept a window whose misfit is about as large in its middle as in all of it, like that of a vibration.
 
     Returns
     -------
     (int, int) or None
-        First and last state; None if no window is long enough, or a strict one does not contain td.
+        First and last state; None if no window is long enough, or if the window does not contain td after its ends are
+        cut off.
     """
     time = law.time
     at = min(int(np.searchsorted(time, td)), time.size - 1)
@@ -182,8 +183,9 @@ def _find_converged_window(
 ) -> tuple[tuple[int, int], float, bool] | None:
     """Find the window around the state ``at`` that hardly shrinks at a tenth of the tolerance; None if there is none.
 
-    The limit is lowered while it is above ``finest``; from ``enough`` on a window may shrink on one side.  Also
-    returned: the misfit that the window may leave, and whether it first began with the record.
+    The tolerance ``limit`` is reduced down to ``finest``; once it is at most ``enough``, a window may shrink at one
+    end. The other returned values are the largest misfit of the window, and True if the first window began with the
+    record.
     """
     time = law.time
     room = limit + noise
@@ -240,8 +242,8 @@ def _is_fading(window: tuple[int, int], finer: tuple[int, int]) -> bool:
 def find_longest_window(law: Law, at: int, room: float) -> tuple[int, int]:
     """Return the first and last state of the longest window around a state with a misfit of at most ``room``.
 
-    Near an end of the flight, a short window may extend beyond the flight.  The window depends on the end that is
-    moved first, so both orders are tried.
+    If the state is near an end of the flight, a window may extend slightly beyond the flight. The window depends on
+    which end is moved first, so both orders are tried.
     """
     last_state = law.time.size - 1
     first = find_farthest(at, 0, lambda i: law.misfit(i, at) <= room)
@@ -264,7 +266,8 @@ def list_moments(time: Samples) -> Iterator[float]:
 def list_marks(time: Samples, td: float) -> Iterator[float]:
     """Yield the start times of the search for the flight around ``td``, which many td share.
 
-    First the nearest of the widely spaced times, whose long flight may contain td, then the two next to td.
+    The first is the nearest of the widely spaced times, because a long flight around it may contain td. The two times
+    nearest to td follow.
     """
     times = tuple(list_moments(time))
     yield min(times[::_FAR], key=lambda moment: abs(moment - td))
@@ -293,10 +296,10 @@ def _tighten_window(
 ) -> tuple[int, int]:
     """Shrink a window until its ends deviate no more than its middle, to cut off the rest of a load.
 
-    The tolerance hides the last, weak pushes of a load.  The middle of the flight shows how exactly the run obeys the
-    law, limited by digits, round-off or the solver's errors.  If that limit is stricter than ``loose``, by which the
-    window was found, and still reaches farther, a state of a contact at the edge of ``loose`` had stopped the search on
-    the other side.
+    The tolerance hides the last, weak forces of a load. The middle of the flight shows how exactly the run obeys the
+    law, which is limited by printed digits, round-off or errors of the solver. The resulting tolerance may be stricter
+    than ``loose``, with which the window was found. The window may then still become longer at one end, if ``loose``
+    admitted a state of a contact that stopped the search at the other end.
     """
     room = 0.0
     for _ in range(_MOST_SHRINKS):
@@ -320,8 +323,9 @@ def _cut_off_hidden_push(
 ) -> tuple[int, int]:
     """Cut off the ends of a window if the tolerance ``room`` may hide a fading force in them.
 
-    The deviation of a smoothly fading push falls with the square of its remaining time: from 4 times the room to the
-    room takes as long as from there to its end.  Less than one state cannot be resolved.
+    The deviation due to a smoothly fading force is proportional to the square of its remaining time. Therefore it falls
+    from 4 times the tolerance to the tolerance in the same time as from the tolerance to zero. Differences of one state
+    are ignored, because they cannot be resolved.
     """
     first, last = window
     wide = find_longest_window(law, (first + last) // 2, 4 * room)

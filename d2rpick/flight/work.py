@@ -1,7 +1,7 @@
 """Find free flight in the energies of the model; only gravity and mass-proportional damping do work in it.
 
-With the resultant F of gravity, the momentum p and the mass m, gravity does the work int F p/m dt; such damping does -2
-alpha int K dt, which Radioss counts as external work.  While nothing touches, the contact energy is constant.
+With the weight F, the momentum p and the mass m, gravity does the work int F p/m dt. Mass-proportional damping does the
+work -2 alpha int K dt, which Radioss includes in the external work. Without contact, the contact energy is constant.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ _OF_DIGITS: Final = 4
 # _MUCH: a relative loss of kinetic energy of at least this is attributed to friction instead of damping [-].
 _LITTLE, _MUCH = 5e-3, 0.5
 
-# Relative error of the damped energy if it is computed from the damping rate of the vibration [-].
+# Relative error of the energy that damping dissipates if it is computed from the damping rate [-].
 _RATE_ERROR: Final = 0.02
 
 
@@ -58,9 +58,10 @@ def compute_work_beyond_gravity(
 ) -> float | None:
     """Return the largest external work in a window that neither gravity nor damping explains [energy].
 
-    The factors of gravity and damping have a sign: gravity acts along the mean change of the momentum, and damping
-    takes energy.  If no velocity is written, the work of gravity is an upward parabola of time.  Errors of digits and
-    of the solver's sums are subtracted.  None if the work is not written, or the window has too few states.
+    The signs of both contributions are known: gravity acts along the mean change of the momentum, and damping reduces
+    the energy. If no velocity is written, the work of gravity is a parabola over time that opens upwards. Errors of
+    printed digits and of the solver's sums are subtracted. The result is None if the work is not written, or if the
+    window has too few states.
     """
     inside = find_window(balance.time, start, end)
     if (
@@ -77,8 +78,8 @@ def limit_to_undriven(
 ) -> FreeFlight | None:
     """Return the part of a flight around ``td`` [time] in which gravity and damping explain the external work.
 
-    A couple of opposite forces drives a model and leaves its momentum alone, and so does nearly a weak load.  None if
-    the work is not written, or if a load does work at td.
+    Opposite forces do work on a model without changing its momentum, and weak loads hardly change it. The result is
+    None if the work is not written, or if a load does work at td.
     """
     time = balance.time
     inside = find_window(time, flight.start, flight.end)
@@ -102,7 +103,7 @@ def _make_law_of_external_work(balance: Balance) -> _ExternalWork:
 class _ExternalWork(Law):
     """Law that gravity and damping do all external work; the misfit is the work that they do not explain [energy].
 
-    Errors of digits and of the solver's sums are subtracted, so that the misfit is 0 in a free flight.
+    Errors of printed digits and of the solver's sums are subtracted, so the misfit is 0 in a free flight.
     """
 
     def __init__(self, balance: Balance) -> None:
@@ -165,7 +166,7 @@ def _fit_one_sided(
 ) -> Samples:
     """Return the residual of a least-squares fit to ``values`` (n,).
 
-    Columns of ``one_sided`` have factors >= 0, the first one at most ``most``.
+    The factors of the columns of ``one_sided`` are at least 0; that of the first column is at most ``most``.
     """
     first, *other_columns = one_sided
     for gravity in ([first], []):
@@ -206,7 +207,7 @@ def compute_change_of_balance(
 ) -> float | None:
     """Return the largest change of kinetic plus internal energy that gravity and damping leave unexplained [energy].
 
-    Errors of digits are subtracted.  None if one of the energies is not written.
+    Errors of printed digits are subtracted. The result is None if one of the energies is not written.
     """
     whole = balance.kinetic_and_internal
     if whole is None:
@@ -236,9 +237,9 @@ def _make_laws_of_work(balance: Balance) -> tuple[_Parabola, _Parabola]:
 def find_balanced_window(balance: Balance, td: float) -> FreeFlight | None:
     """Find the window around ``td`` [time] in which only gravity and damping change the energy; None if there is none.
 
-    The external work and kinetic plus internal energy must obey this.  If the momentum of the model is written it shows
-    all of that and more: a model whose momentum is never that of free flight may be driven so smoothly that its energy
-    looks like it.
+    Both the external work and kinetic plus internal energy must obey this law. If the momentum of the model is written,
+    it is better evidence, and the energies are not used: a load may act so smoothly that the energy looks like that of
+    a free flight.
     """
     time = balance.time
     terms = _list_terms(balance)
@@ -279,10 +280,12 @@ def list_damped_energies(
 ) -> tuple[list[Samples], float]:
     """Return the energies (n,) that only damping reduces in a flight, and their rounding error [energy].
 
-    The first is kinetic plus internal energy; the list is empty if a load of unknown size works on the model as well.
+    The first one is kinetic plus internal energy. The list is empty if a load of unknown size also does work on the
+    model.
 
-    Under gravity that sum grows as the body falls, which hides what damping takes.  The sum less the work of gravity,
-    and the damping energy if it is written, show it.  ``momenta`` are those that show the flight and its gravity.
+    Under gravity, this sum grows as the body falls, which hides the loss by damping. The sum minus the work of gravity
+    shows the loss, and so does the damping energy if it is written. ``momenta`` are the momenta that show the flight
+    and its gravity.
     """
     whole = balance.kinetic_and_internal
     assert whole is not None
@@ -307,7 +310,7 @@ def _compute_work_of_gravity(
 ) -> Samples:
     """Return the work of gravity since the first state (n,), from the momentum that gravity gives the model [energy].
 
-    For a velocity, the mass is the largest one that the written kinetic energy allows.
+    If only a velocity is known, the mass is the largest one that the written kinetic energy allows.
     """
     from d2rpick.flight.free_fall import FreeFall
 
@@ -337,11 +340,11 @@ def is_taken_by_damping(
 ) -> bool | None:
     r"""Return True if kinetic plus internal energy changes between two times [time] as in a damped vibration.
 
-    Damping within the body takes energy only from the vibration, whose energy V(t) is ``vibration``: :math:`K + E - V`
-    is constant.  Damping proportional to mass also takes it from the motion of the body, at the rate ``alpha`` of its
-    vibration [1/time]: :math:`K + E + 2 \alpha \int K dt` is constant.  Nothing is fitted, so that no load can pass for
-    either ("Energies that look like flight" in docs).  Drag takes energy from both, too, but hardly at the same rate:
-    what is taken has to agree within 2 %.  None if an energy is missing.
+    Damping within the body takes energy only from the vibration, whose energy V(t) is ``vibration``, so :math:`K + E -
+    V` is constant. Mass-proportional damping also takes energy from the motion of the body, at the damping rate
+    ``alpha`` of the vibration [1/time], so :math:`K + E + 2 \alpha \int K dt` is constant. No parameter is fitted, so a
+    load cannot be mistaken for damping ("Energies that look like flight" in docs). Drag also takes energy from both,
+    but hardly at the same rate, and the loss has to agree within 2 %. The result is None if an energy is missing.
     """
     inside = find_window(balance.time, start, end)
     whole = balance.kinetic_and_internal
@@ -364,9 +367,10 @@ def is_taken_by_damping(
 def _classify_gravity(balance: Balance, first: int, last: int) -> float:
     """Return the gravity in a window: 0 if the energies are constant or only damped; otherwise unknown.
 
-    NaN if energies are lost, by gravity, friction or damping: the loss by damping falls with the kinetic energy, which
-    shows if much of it is gone.  Infinite if they grow, or lose more than the vibration has, and rather as a constant
-    force takes it than as damping does: by gravity or another load.
+    The result is NaN if energy is lost because of gravity, friction or damping; these cannot be distinguished unless
+    much of the kinetic energy is lost, because only the loss by damping decreases with the kinetic energy. It is
+    infinite if the energies grow because of gravity or another load. It is also infinite if they lose more than the
+    vibration energy, and the loss is more like that due to a constant force than that due to damping.
     """
     whole = balance.kinetic_and_internal
     kinetic = balance.kinetic
@@ -417,7 +421,8 @@ def _list_terms(balance: Balance) -> list[Samples]:
 class _Parabola(Law):
     """Law of parabolic energies over time, except for damping, which removes a fraction of the kinetic energy.
 
-    Solvers compute velocities half a step away from positions, which adds the rate of the ``internal`` energy.
+    Solvers compute velocities half a time step away from positions, which adds a term proportional to the rate of
+    change of the ``internal`` energy.
     """
 
     def __init__(
@@ -473,8 +478,8 @@ def _make_law_of_contacts(balance: Balance) -> Constant:
 def find_plateau(balance: Balance, td: float) -> FreeFlight | None:
     """Find the window around ``td`` in which the contact energy is constant [time]; None if there is none.
 
-    If it has been constant since the first state no contact has ended, and another kind of load may act: such a window
-    counts only if the external work, which shows that load, is written too.
+    If the energy has been constant since the first state, no contact has ended, and a load of another kind may act.
+    Such a window is used only if the external work, which shows this load, is written, too.
     """
     time = balance.time
     energy = balance.sliding

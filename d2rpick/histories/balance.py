@@ -73,8 +73,8 @@ def read_balance(
 ) -> Balance | None:
     """Return the energy balance of the whole model, and the hourglass energies of ``parts``, up to a time [time].
 
-    ``known`` are its `terms_of` if they were read already and all times are requested. The result is None if the
-    files contain no term by which the run can be judged, or if the columns are ambiguous.
+    ``known`` is the result of `read_terms` if it is already available and all times are requested. The result is None
+    if the files contain no term by which the run can be judged, or if the columns are ambiguous.
     """
     whole = _find_whole_model(databases)
     of_parts = _read_hourglass_energies(databases, parts, until) if parts else ()
@@ -90,7 +90,7 @@ def read_balance(
 def read_terms(databases: Sequence[Legs]) -> Balance | None:
     """Return the energy balance of the whole model, even if too much is missing to judge the run.
 
-    The result is None if the files have no energy but the internal one, or if the columns are ambiguous.
+    The result is None if the files contain only the internal energy, or if the columns are ambiguous.
     """
     whole = _find_whole_model(databases)
     if whole is None or {*_QUANTITIES.values()}.isdisjoint(whole.quantities):
@@ -175,7 +175,7 @@ def _find_global_velocities(database: Legs) -> dict[str, str]:
 class _Columns:
     """The columns of a database for its first ``states`` states, keyed by quantity.
 
-    A column that is missing, or not in every state, is None.
+    A column is None if it is missing in the database or in some of its states.
     """
 
     def __init__(self, database: Legs, states: int) -> None:
@@ -311,7 +311,7 @@ def find_springs(
 ) -> tuple[Part, ...]:
     """Return the parts whose energies add up to the spring and damper energy; empty if there are none.
 
-    ``energies`` are those of all parts, shape (n, parts), at ``time`` (n,).
+    ``energies`` (n, parts) contains the energies of all parts at the times ``time`` (n,).
     """
     candidates = ((legs, find_spring_energy(legs)) for legs in databases)
     database, springs = next(

@@ -1,7 +1,8 @@
 """Read contact and rigid-wall forces, and the intervals between states in which these forces act.
 
-A solver writes exactly zero if nothing touches. LS-DYNA writes forces at each state; Radioss writes their impulses
-since the start, which do not change while no force acts, and miss no force.
+A solver writes exactly zero if there is no contact. LS-DYNA writes the forces at each state. Radioss writes their
+impulses since the start of the run, which change only while a force acts, so that no force between two states is
+missed.
 """
 
 from __future__ import annotations
@@ -28,8 +29,8 @@ _NOTHING: Final = 1e-6
 class ContactForce(NamedTuple):
     """The force that the contact or rigid wall ``name`` exerts at the times ``time`` [time], shape (n,).
 
-    ``impulses`` of shape (n, 3) are those since the state before, 0 for the first state; NaN if unknown [momentum].
-    ``acts`` (n,) is True if a force acts between a state and the one before.
+    ``impulses`` (n, 3) contains the impulse since the previous state [momentum]; it is 0 for the first state and NaN if
+    unknown. ``acts`` (n,) is True if a force acts between the previous state and this state.
     """
 
     name: str
@@ -60,7 +61,7 @@ class ContactForce(NamedTuple):
     def of_changes(cls, name: str, time: Samples, values: Samples) -> ContactForce:
         """Make a contact force from columns (n, k) of forces or impulses that change while the force acts.
 
-        A force that stays at one value is zero, since a contact lets parts vibrate.
+        A constant force is zero, because the force of a contact between vibrating parts always changes.
         """
         acts = np.zeros(time.size, np.bool_)
         acts[1:] = _is_above_round_off(np.diff(values, axis=0))
@@ -98,7 +99,7 @@ def join_contact_forces(
 ) -> ContactForce:
     """Join the forces of one contact from all restart segments of a run; ``keep`` is a mask of the valid states.
 
-    Between two restart segments the force acts if it acts just before or after.
+    Between two restart segments, the force is assumed to act if it acts immediately before or after.
     """
     if len(pieces) == 1 and keep.all():
         return pieces[0]

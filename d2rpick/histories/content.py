@@ -1,8 +1,9 @@
 """Provide the bytes of a file as they were when the file was opened, even if the file changes later.
 
-A running solver appends to its files, and a restarted one cuts them and writes them anew. Bytes after the size at
-opening are ignored. If a file is cut or rewritten while it is read, its size and times show it, which is an error.
-Files are not mapped into memory: if a mapped page is cut off, the system kills the process.
+A running solver appends to its files, and a restarted solver truncates them and writes them anew. Bytes beyond the size
+at opening are ignored. If a file is truncated or rewritten while it is read, its size and modification time show this,
+and an error is raised. Files are not mapped into memory, because the system kills a process whose mapped page is
+truncated.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
     Addresses = NDArray[np.int64]
 
 _HELD: Final = 1 << 24  # Largest size of a file that is read into memory [bytes].
-_LINES: Final = 1 << 16  # Number of bytes in which line endings are counted at a time.
+_LINES: Final = 1 << 16  # Line endings are counted in blocks of this size [bytes].
 # Number of bytes at each end of a file that are compared to check that a file has only grown.
 _END: Final = 1 << 12
 
@@ -72,7 +73,7 @@ class Content:
     def fill_rows(self, room: Bytes, begin: int, stride: int, size_after: int) -> bytes:
         """Fill the rows of ``room`` (n, width) with the bytes at ``begin`` and after each further ``stride`` bytes.
 
-        Return the ``rest`` bytes after the last stride, fewer if the file ends before.
+        Return the ``rest`` bytes after the last stride, or fewer if the file ends earlier.
         """
         end = begin + len(room) * stride
         if len(room):
@@ -100,7 +101,7 @@ class OnDisk(Content):
     file : int
         Descriptor of the file, which is closed with this object.
     state : FileState
-        State of the file when no write is pending.
+        State of the file at a time at which no write was in progress.
     """
 
     # Number of bytes that are read at a time if a request is large.
@@ -283,7 +284,8 @@ class OnDisk(Content):
 class Scattered(OnDisk):
     """The content of a file that is read at a few distant offsets.
 
-    The file is opened for each request, since a run may have written more such files than a process may have open.
+    The file is opened for each request, because a run may have written more such files than a process may open at a
+    time.
     """
 
     window = 1 << 12
@@ -294,7 +296,7 @@ class Scattered(OnDisk):
 
     @cached_property
     def _own(self) -> local:  # type: ignore[override]  # a property overrides an attribute
-        """The window of the current thread, which is created on first use because most files need no window."""
+        """The view of the file that this thread uses, which is created on first use because most files need none."""
         from threading import local
 
         return local()
@@ -338,7 +340,7 @@ def open_scattered(names: Sequence[str]) -> list[Scattered]:
     Raises
     ------
     FormatError
-        If a file changes all the time.
+        If a file keeps changing.
     """
     states = wait_for_settled_states(names, FormatError)
     return [Scattered(name, state) for name, state in zip(names, states, strict=True)]
@@ -350,7 +352,7 @@ def open_content(name: str) -> bytes | OnDisk:
     Raises
     ------
     FormatError
-        If it changes all the time, or is a device.
+        If the file keeps changing, or is a device.
     """
     with open(name, "rb", buffering=0) as file:  # noqa: PTH123  pathlib would slow down start-up
         state = read_at_rest(name, file, FormatError, may_grow=True)
@@ -366,9 +368,9 @@ def _reopen(name: str, state: FileState, ends: tuple[bytes, bytes]) -> OnDisk:
     Raises
     ------
     FormatError
-        If it is gone.
+        If the file no longer exists.
     ChangedError
-        If it was written anew since.
+        If the file was written anew since then.
     """
     try:
         with open(name, "rb", buffering=0) as file:  # noqa: PTH123  pathlib would slow down start-up

@@ -1,6 +1,6 @@
 """Represent one or more restart segments of a run as a database whose columns are read on request.
 
-Databases of different formats that one run wrote are companions; they are checked here for being of one run.
+Databases of different formats that one run wrote are companions; this module checks that they belong to one run.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from d2rpick.histories.names import (
     mark_namesakes,
     resolve_name,
 )
-from d2rpick.histories.samples import find_newest_states, find_window
+from d2rpick.histories.samples import STEPS_BACK, find_newest_states, find_window
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -58,8 +58,8 @@ _MORE, _ROUND_OFF = 0.1, 1e-6
 class Database:
     """The states of one restart segment of a run in the units of the run; each reader implements the methods.
 
-    Times are those of the file: they may repeat or step back if a restart wrote a state again. A column that is
-    missing, or not in every state, raises FormatError.
+    The times are those of the file: they may repeat or decrease if a restart wrote a state again. A FormatError is
+    raised for a column that is missing in the file or in some of its states.
 
     Attributes
     ----------
@@ -68,27 +68,29 @@ class Database:
     format : str
         Name of the format, as in the list of readers.
     version, title : str
-        Solver and release as far as the file names them; title of the run.
+        Solver and release, as far as the file contains them, and title of the run.
     complete : bool
-        True if the file ends after a complete state and no state before is missing.
+        True if the file ends after a complete state and no earlier state is missing.
     notes : tuple of str
-        Notes for the user on what was read.
+        Notes for the user about the content that was read.
     channels : tuple of str
         Names of the columns of the whole model, without the time.
     parts : tuple of Part
         Parts with their own histories, in the order of the file.
     node_ids : tuple of int
-        Numbers of the nodes whose displacements are written and can be read.
+        Ids of the nodes whose displacements are written and can be read.
     time_unit : str
-        Unit of the times; empty if the file does not name it, as files of solvers.
+        Unit of the times; empty if the file does not contain it, which is the case for solver files.
     digits : int
         Significant decimal digits of all numbers.
     named_by_people : bool
-        True if users or other programs than solvers named the channels, so that the names may mean anything.
+        True if users or programs other than solvers named the channels, so that a name need not denote the usual
+        quantity.
     no_channels, no_parts : str
         Message if channels or parts are requested and there are none.
     only_forces : bool
-        True if there are contact forces, but neither the whole model nor parts: it is used only with other files.
+        True if the database contains contact forces, but no data of the whole model or of parts; it is used only
+        together with other files.
     """
 
     source: str
@@ -170,8 +172,8 @@ class Database:
 class Legs:
     """The restart segments of one run in order, as one `Database`. If two overlap, the newer segment is used.
 
-    A single segment needs this too if a restart wrote states again, or if printed times are equal. Segments that have
-    no states are used only if no segment has states.
+    A single segment needs this class, too, because a restart may have written states again, and printed times may be
+    equal. Segments without states are used only if no segment has states.
     """
 
     def __init__(
@@ -222,8 +224,8 @@ class Legs:
     def quantities(self) -> Mapping[str, str]:
         """Channels recognised by name, keyed by quantity of `d2rpick.histories.names.QUANTITIES`.
 
-        If several channels are named like a quantity, none of them is used, unless one has exactly the name of the
-        quantity.
+        If the names of several channels denote the same quantity, none of them is used, unless one is exactly the name
+        of the quantity.
         """
         channels: dict[str, str] = {}
         for quantity, names in find_quantities(self.channels).items():
@@ -393,7 +395,22 @@ class Legs:
             if states.size and not states.any()
         ]
         valid_times = all_times if keep.all() else all_times[keep]
-        return keep, (*notes, *unused, *_note_holes(valid_times))
+        place = self._name_first_step_back(times)
+        placed = [
+            f"{place}: {note}" if note.startswith(STEPS_BACK) else note
+            for note in notes
+        ]
+        return keep, (*placed, *unused, *_note_holes(valid_times))
+
+    def _name_first_step_back(self, times: Sequence[Samples]) -> str:
+        """Return the file and the number of its first state whose time is before that of the state that precedes it."""
+        last = -np.inf
+        for leg, time in zip(self._legs, times, strict=True):
+            back = np.flatnonzero(np.diff(time, prepend=last) < 0)
+            if back.size:
+                return f"{leg.source}, state {back[0] + 1}"
+            last = time[-1] if time.size else last
+        return ""
 
     def _joined(self, columns: Sequence[Samples], keep: NDArray[np.bool_]) -> Samples:
         """Join the columns of the restart segments, and remove the invalid states."""
@@ -457,7 +474,7 @@ def _note_holes(time: Samples) -> tuple[str, ...]:
 def check_energy_of_parts(whole: Legs, holder: Legs, energies: Samples) -> None:
     """Raise FormatError if the internal energy of the parts exceeds the energy of the whole model at the same times.
 
-    ``energies`` are those of some parts of ``holder``, shape (n, parts) [energy].
+    ``energies`` (n, parts) contains the energies of some parts in the database ``holder`` [energy].
     """
     try:
         if whole is holder or whole.energy_channel is None:

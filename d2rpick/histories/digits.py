@@ -33,10 +33,10 @@ _TYPED_TIME: Final = (
 
 # A time converted to ms or us is plausible if it is at least this fraction of the record after its start [-].
 _NEVER_MEANT: Final = 0.01
-# A converted time is suggested only if it is at least this fraction of the record after its start [-].
+# A converted time is suggested only if it lies at least this fraction of the record after the start [-].
 _HARDLY_MEANT: Final = 0.05
 # A td within this number of first states is assumed to be in another unit, because it would hardly save time.
-# Only a record of 1000 or more states can contain both a td and 1000 times this td.
+# In a record of fewer than 1000 states, a td and 1000 times this td cannot both be valid.
 _FIRST_STATES: Final = 10
 
 
@@ -187,10 +187,8 @@ def _find_next_printed(printed: float) -> float:
 def ask_for_smaller_unit(record: Samples, times: Sequence[float], argument: str) -> str:
     """Return text that asks whether an argument's times outside a ``record`` (n,) were given in a smaller unit.
 
-    The question is empty if that does not explain the value.
-
-    The question is asked if the argument is inside the record in ms or us. An argument that misses the record by less
-    than its length is assumed to be in the unit of the record.
+    The question is asked if the argument would lie inside the record in ms or us; otherwise the text is empty. An
+    argument that lies outside the record by less than its length is assumed to be in the unit of the record.
     """
     first = float(record[0])
     last = float(record[-1])
@@ -213,7 +211,7 @@ def ask_for_larger_unit(
 ) -> str:
     """Return text that asks whether early times for a ``record`` (n,) in ms or us were given in s.
 
-    The question is empty if that does not explain the value.
+    The text is empty if this does not explain the values.
     """
     values = convert_to_unit_of_record(record, times, unit)
     return _ask_for_unit("s", argument, values) if values else ""
@@ -224,8 +222,8 @@ def convert_to_unit_of_record(
 ) -> list[float]:
     """Convert times among the first ten states of a ``record`` (n,) from seconds to the record's unit, ms or us.
 
-    Return an empty list if neither 1000 times nor 1,000,000 times their value is a time of the record that a user may
-    mean. ``unit`` is the unit of the record if its file names it. The start of the record is the same in any unit.
+    Return an empty list if neither 1000 times nor 1,000,000 times their value is a plausible time of the record.
+    ``unit`` is the unit of the record if its file contains it. The start of the record has the same value in any unit.
 
     Examples
     --------

@@ -1,8 +1,9 @@
 """Read the ASCII databases of LS-DYNA that contain only forces: rcforc (contacts) and rwforc (rigid walls).
 
-A line of rcforc is a side of a contact at a time: ``slave 1 time 0.1 x 0.0 y 0.0 z 0.0 mass 0.0``; newer releases
-call the sides SURFA and SURFB. A line of rwforc is the time, the number of a wall, its normal force and the force
-along each axis. Titles are in the legend. A cut line is left out, for instance in a run that is still writing.
+A line of rcforc contains the force on one side of a contact at one time: ``slave 1 time 0.1 x 0.0 y 0.0 z 0.0 mass
+0.0``; newer releases call the sides SURFA and SURFB. A line of rwforc contains the time, the number of a wall, its
+normal force and the force along each axis. Titles are in the legend. A truncated line is omitted; it occurs, for
+instance, while a run is still writing.
 """
 
 from __future__ import annotations

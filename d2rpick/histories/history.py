@@ -39,8 +39,8 @@ _TOGETHER: Final = 1 << 14
 class Precision(NamedTuple):
     """The precision with which the numbers of a column were printed.
 
-    ``digits`` are the significant digits (17 restore every double); if ``decimals`` is given, the numbers have this
-    fixed number of decimals instead.
+    ``digits`` is the number of significant digits (17 restore every double); if ``decimals`` is given, the numbers have
+    this fixed number of decimals instead.
     """
 
     digits: int = 17
@@ -86,10 +86,11 @@ EXACT = Precision()
 class Momenta:
     """Momenta of ``parts``, or of the model if ``parts`` is None: ``values`` (n, parts, 3) over ``time`` (n,).
 
-    ``precision`` is the one of the printed numbers. ``chosen`` are the indices of the parts to switch, ``flying``
-    those of the parts known to fly together, if any. ``masses`` has shape (parts,), NaN if unknown; None if no mass
-    is known [mass]. ``velocity`` is True if the values are velocities, of an unknown mass. ``surroundings`` are the
-    forces from outside. ``memory`` keeps results for sets of parts, since the same few sets are requested often.
+    ``precision`` is that of the printed numbers. ``chosen`` contains the indices of the parts to be switched, and
+    ``flying`` those of the parts that are known to fly together, if any. ``masses`` (parts,) contains NaN for an
+    unknown mass, and is None if no mass is known [mass]. ``velocity`` is True if the values are velocities of unknown
+    masses. ``surroundings`` describes the external forces. ``memory`` keeps results for sets of parts, because the same
+    few sets are requested often.
     """
 
     time: Samples
@@ -180,12 +181,13 @@ def _sum_momenta(momenta: Momenta, *members: int) -> Samples:
 class Balance:
     """Energies of the whole model at the times ``time``, shape (n,). None stands for an energy that the files lack.
 
-    ``sliding`` is the contact energy, ``friction`` its part from friction; ``damping`` and ``wall`` are dissipated by
-    damping and at rigid walls. ``external_work`` is the work of all loads, ``total`` the total energy of the solver,
-    ``ratio`` that total over initial energy plus external work, ``eroded`` the energy of eroded elements.
-    ``artificial`` is the energy of Abaqus against hourglassing, which ``internal`` contains; ``hourglass`` is not
-    part of it. ``velocity`` (n, 3) is that of the centre of mass, up to a factor. ``hourglass_of_parts`` are the
-    highest hourglass and internal energy of each part.
+    ``sliding`` is the contact energy, and ``friction`` the part of it that is due to friction; ``damping`` and ``wall``
+    are the energies dissipated by damping and at rigid walls. ``external_work`` is the work of all loads, ``total`` the
+    total energy according to the solver, ``ratio`` this total divided by the initial energy plus the external work, and
+    ``eroded`` the energy of eroded elements. ``artificial`` is the hourglass-control energy of Abaqus, which
+    ``internal`` contains, whereas ``internal`` does not contain ``hourglass``. ``velocity`` (n, 3) is that of the
+    centre of mass, possibly multiplied by a constant. ``hourglass_of_parts`` contains the highest hourglass and
+    internal energies of each part.
     """
 
     time: Samples
@@ -234,11 +236,12 @@ class Balance:
 class Given:
     """Data that show flights in a run, other than the energy of the parts.
 
-    ``momenta`` are those of the parts, then of the whole model, as far as they are written. ``balance`` are the
-    energies of the whole model; None if only the internal energy is written. ``masses`` are those of the parts with
-    known momenta, in the order of the parts, NaN if unknown; None if no mass is known. ``forces`` are those of contacts
-    and rigid walls. ``not_chosen`` are the parts that a table names as left out of its internal energy.
-    ``written`` is all data of a switched run, whose parts are unknown while they were rigid.
+    ``momenta`` contains those of the parts and then those of the whole model, as far as they are written. ``balance``
+    contains the energies of the whole model; None if only the internal energy is written. ``masses`` contains those of
+    the parts with known momenta, in the order of the parts; a value is NaN if it is unknown, and all are None if no
+    mass is known. ``forces`` contains those of contacts and rigid walls. ``not_chosen`` contains the parts that a table
+    names as not included in its internal energy. ``written`` contains all data of a switched run whose part data are
+    not used, because the parts were rigid at some time.
     """
 
     momenta: tuple[Momenta, ...] = ()
@@ -271,13 +274,13 @@ NO_EVIDENCE = Given()
 class History:
     """Internal energy over time of the parts to switch, in the consistent units of the run.
 
-    ``time`` and ``energy`` are read-only copies, finite, of shape (n,); ``time`` increases strictly. Anything else
-    raises HistoryError. ``source`` are the file names as the user gave them; ``channel`` names what is used as the
-    energy; ``parts`` are the parts whose energy it is, or None for the whole model; ``springs`` are those of them whose
-    energy is left out; ``energy_format`` is the format of the file with the energy. ``complete`` is False if a file
-    ends within a state; ``notes`` are for the user; ``files`` were read. ``time_unit`` and
-    ``energy_unit`` are empty unless the file names them. ``evidence`` shows when parts fly freely; the evidence of a
-    file is read at the first request. ``surroundings`` are the forces from outside.
+    ``time`` and ``energy`` are read-only copies with finite values, shape (n,); ``time`` increases strictly. Other
+    values raise a HistoryError. ``source`` contains the file names as the user gave them, and ``channel`` the name of
+    the energy. ``parts`` contains the parts to which the energy belongs, or is None for the whole model; ``springs``
+    contains those of them whose energy is excluded. ``energy_format`` is the format of the file with the energy.
+    ``complete`` is False if a file ends within a state. ``notes`` are for the user, and ``files`` contains all files
+    that were read. ``time_unit`` and ``energy_unit`` are empty unless the file contains them. ``evidence`` shows when
+    parts fly freely; it is read from the files at the first request. ``surroundings`` describes the external forces.
     """
 
     time: Samples
@@ -395,7 +398,7 @@ class History:
     def check(self, *times: float, argument: str = "", subject: str = "") -> None:
         """Raise RangeError if a time lies outside the record.
 
-        The message names the ``argument`` that the user gave, or else describes the times as the ``subject``.
+        The message names the ``argument`` that the user gave or, without it, calls the times ``subject``.
         """
         low = self.time[0]
         high = self.time[-1]
@@ -440,7 +443,7 @@ class History:
     def energy_at(self, time: float, argument: str = "") -> float:
         """Return the energy at ``time``, interpolated linearly.
 
-        A RangeError for a time outside names the ``argument``.
+        A time outside the record raises a RangeError that names the ``argument``.
         """
         self.check(time, argument=argument)
         index = max(int(np.searchsorted(self.time, time, side="right")) - 1, 0)

@@ -44,7 +44,7 @@ _BEFORE: Final = (
 _SHORT: Final = 7  # Number of digits of an abbreviated commit hash.
 
 WITH_AN_ERROR: Final = "with an error"
-_PACKED: Final = "normally: its history is packed"
+_PACKED: Final = "normally (its history is packed)"
 # Texts at the end of Radioss' engine listing and of LS-DYNA's messag and d3hsp.
 _ENDINGS: Final = {
     b"ERROR TERMINATION": WITH_AN_ERROR,
@@ -97,8 +97,8 @@ def find_wrong_energies(histories: Iterable[str]) -> Iterator[str]:
 def find_ending(history: str) -> str | None:
     """Return how a run ended according to its last history and the listing next to it; None if it is unknown.
 
-    A packed history belongs to a run that has ended.  A restart segment that was told to stop has not ended the run,
-    nor has one that another segment follows.
+    A packed history belongs to a run that has ended. The run has not ended with a restart segment that was told to
+    stop, or that is followed by another segment.
     """
     from pathlib import Path  # Imported here to keep start-up fast.
 
@@ -176,7 +176,7 @@ def read_timing(path: str) -> Timing:
     Raises
     ------
     FormatError
-        If the file cannot be read, or has no usable summary of CPU times.
+        If the file cannot be read, or contains no usable summary of CPU times.
     """
     data = _read_listing(path)
     timing = find_radioss_timing(path, data)
@@ -240,7 +240,7 @@ def find_radioss_timing(name: str, data: bytes) -> Timing | None:
 def _read_d3hsp_timing(name: str, data: bytes) -> Timing | None:
     """Return the CPU times in a d3hsp without initialisation.
 
-    If they are rounded to zero, elapsed times replace them.
+    If the CPU times are rounded to zero, elapsed times replace them.
     """
     table = data[data.rindex(_TIMING) :]
     cycles = re.search(_D3HSP_CYCLES, table)
@@ -265,12 +265,13 @@ def find_printed_steps(
     run : Run
         Run whose glstat is examined.
     *neighbours : str
-        Files whose folders are searched for a d3hsp too.
+        Files whose folders are also searched for a d3hsp.
 
     Returns
     -------
     dict
-        (step, source) by part id, of parts that control the step or are in the table of smallest steps [time].
+        (time step [time], source) of the parts that control the time step or are in the table of smallest time steps,
+        keyed by part id.
     """
     steps: dict[int, tuple[float, str]] = {}
     names = (*run.sources, *neighbours)

@@ -1,8 +1,8 @@
 """Recognise the quantity in a column, curve or dataset from its name in tables, HDF5 files and databases.
 
-A name is cut into words, without its unit. The phrases of `d2rpick.histories.names` are compared with these words,
-the longest first. Words for the whole model change nothing ("Global Kinetic Energy", "ALLKE for Whole Model"); with
-any other word the column contains the quantity of something else, such as a part ("Kinetic energy of the door").
+A name is split into words, without its unit. The phrases of `d2rpick.histories.names` are compared with these words,
+longest phrases first. Words that denote the whole model are ignored ("Global Kinetic Energy", "ALLKE for Whole Model").
+If there is any other word, the quantity belongs to something else, such as a part ("Kinetic energy of the door").
 """
 
 from __future__ import annotations
@@ -103,7 +103,7 @@ _PHRASES: Final[Mapping[str, str]] = dict(_list_phrases())
 def find_meaning(name: str) -> Meaning | None:
     """Return the quantity that a name denotes, with the rank of the match; None if it denotes none or several.
 
-    The name may be a path: its last step decides, if that means something.
+    The name may be a path; its last component is used if it denotes a quantity.
 
     Examples
     --------
@@ -199,7 +199,7 @@ def is_total_internal_energy(name: str) -> bool:
 def find_internal_energies(names: Sequence[str]) -> list[int]:
     """Return the indices of the names that denote exactly an internal energy or, failing that, that mention one.
 
-    A total is not preferred to the energies of parts: only the user knows which energy is to be locked in.
+    A total is not preferred to the energies of parts, because only the user knows which energy is to be frozen.
     """
     exact = list[int]()
     inexact = list[int]()
@@ -233,8 +233,8 @@ def find_quantity(name: str) -> str | None:
 def find_quantities(names: Sequence[str]) -> dict[str, list[str]]:
     """Return the names that best match each of the `QUANTITIES`, by quantity.
 
-    If the only internal energy belongs to something else, quantities of the same thing are used: it is the subject of
-    the table. A column named "total" contains the total energy if there is a kinetic energy too.
+    If the only internal energy belongs to something other than the whole model, this is the subject of the table, and
+    its other quantities are used. A column named "total" contains the total energy if there is also a kinetic energy.
 
     Examples
     --------
@@ -264,7 +264,7 @@ def find_quantities(names: Sequence[str]) -> dict[str, list[str]]:
 
 
 def _find_subject(names: Sequence[str]) -> tuple[str, ...]:
-    """Return the words that name the owner of the only internal energy; empty unless there is exactly one energy."""
+    """Return the words that name the part or model of the internal energy; empty unless exactly one column holds it."""
     indices = find_internal_energies(names)
     meaning = find_meaning(names[indices[0]]) if len(indices) == 1 else None
     return meaning.others if meaning else ()

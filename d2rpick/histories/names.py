@@ -303,11 +303,11 @@ def mark_namesakes(parts: Iterable[Part]) -> tuple[Part, ...]:
 class Selection(NamedTuple):
     """The selected columns (by name, number or label) and parts (by number, range or title).
 
-    An empty selection is the time and the internal energy of the whole model. Several energies, and the energies of
-    several parts, are added. ``flying`` are the parts known to fly together with the selected ones. ``channels`` are
-    pairs of a quantity (a key of `d2rpick.histories.names.QUANTITIES`) and the name of its channel, if that is not a
-    usual name. ``springs`` are the numbers of the parts that are springs or dampers; None if they are to be found by
-    their energies.
+    An empty selection stands for the time and the internal energy of the whole model. If several energies or parts are
+    selected, their energies are added. ``flying`` contains the parts that are known to fly together with the selected
+    ones. ``channels`` contains pairs of a quantity (a key of `d2rpick.histories.names.QUANTITIES`) and the name of its
+    channel if this is not a usual name. ``springs`` contains the numbers of the parts that are springs or dampers; None
+    if they are to be found from their energies.
     """
 
     time: str | None = None
@@ -326,7 +326,8 @@ def select_parts(
     Raises
     ------
     FormatError
-        If no part has a number or title, a range contains none, or several parts have a title; ``where`` is named.
+        If no part has a given number or title, a range contains no part, or several parts have the same title; the
+        message names ``where``.
 
     Examples
     --------

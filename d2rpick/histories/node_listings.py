@@ -1,8 +1,8 @@
 """Find the motion of nodes in a run, which may be in LS-DYNA's ASCII database nodout; this module reads it.
 
-A state begins with ``n o d a l   p r i n t   o u t   f o r   t i m e  s t e p`` and its time. A line is the number of a
-node and its displacements, velocities, accelerations and coordinates; rotations follow in a block of their own. A state
-that is cut at the end of the file is left out, for instance in a run that is still writing.
+A state begins with ``n o d a l   p r i n t   o u t   f o r   t i m e  s t e p`` and its time. A line contains the
+number of a node and its displacements, velocities, accelerations and coordinates; rotations follow in a separate block.
+A state that is truncated at the end of the file is omitted; it occurs, for instance, while a run is still writing.
 """
 
 from __future__ import annotations
@@ -41,7 +41,8 @@ def find_motion(
 ) -> NodeMotion | None:
     """Return the motion of the wanted nodes from the first source that contains any of them.
 
-    None if neither the databases of a run nor its listings of nodes contain them, or if their records are damaged.
+    The result is None if neither the databases nor the node listings of the run contain them, or if their records are
+    damaged.
     """
     for database in databases:
         motion = give_if_written(partial(_read_database, database, wanted))
@@ -68,7 +69,7 @@ def read_listed_nodes(
     Raises
     ------
     FormatError
-        If a file has no state that can be read, or states with different nodes.
+        If a file has no readable state, or if its states have different nodes.
     """
     pieces = [_read_file(source) for source in sources]
     pieces.sort(key=lambda piece: float(piece.time[0]))

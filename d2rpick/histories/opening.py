@@ -78,16 +78,16 @@ def load_reader(kind: str) -> Reader:
 def open_run(
     names: Sequence[str], selection: Selection = _DEFAULT, input_format: str = "auto"
 ) -> OpenedRun:
-    """Open the files of one run. Files of one format are its restart segments, other files are companion files.
+    """Open the files of one run: files of the same format are its restart segments, and all others are companion files.
 
     Parameters
     ----------
     names : sequence of str
         Files, folders, globs, or ``-`` for standard input.
     selection : Selection
-        What a table needs to be read: its time and energy columns.
+        Selection that contains the time and energy columns, which are needed to read a table.
     input_format : str
-        A key of `READERS` for all files, or ``auto``: detected by the content, never by the name.
+        A key of `READERS` for all files, or ``auto`` to detect the format from the content (never from the name).
 
     Raises
     ------
@@ -120,7 +120,7 @@ def open_sources(
 ) -> OpenedRun:
     """Open the files of one run from their bytes; the arguments and errors are those of `open_run`.
 
-    ``notes_on_names`` are about the names by which the files were found.
+    ``notes_on_names`` contains notes about the names by which the files were found.
     """
     with_forces: list[Source] = []
     with_nodes: list[Source] = []
@@ -129,16 +129,8 @@ def open_sources(
         with_nodes = [source for source in sources if _is_node_listing(source)]
     listings = (*with_forces, *with_nodes)
     sources = [source for source in sources if source not in listings]
-    if not sources and with_forces:
-        raise FormatError(
-            f"{with_forces[0].name}: an rcforc or rwforc of LS-DYNA, which has forces and no internal energy; "
-            "name the glstat, matsum or binout of the run with it"
-        )
-    if not sources and with_nodes:
-        raise FormatError(
-            f"{with_nodes[0].name}: this is the nodout of LS-DYNA, which has no internal energy; "
-            "name the glstat, matsum or binout of the run with it"
-        )
+    if not sources:
+        _refuse_only_listings(with_forces, with_nodes)
     kinds, left_out = _sort_by_format(sources, input_format)
     ordered = [kind for kind in READERS if kind in kinds]
     _refuse_time_of_solver(ordered, selection.time)
@@ -182,6 +174,22 @@ def open_sources(
     )
 
 
+def _refuse_only_listings(
+    with_forces: Sequence[Source], with_nodes: Sequence[Source]
+) -> None:
+    """Raise FormatError if there are only listings of forces or of the motion of nodes, which contain no energy."""
+    if with_forces:
+        raise FormatError(
+            f"{with_forces[0].name}: an rcforc or rwforc of LS-DYNA, which has forces and no internal energy; "
+            "name the glstat, matsum or binout of the run with it"
+        )
+    if with_nodes:
+        raise FormatError(
+            f"{with_nodes[0].name}: this is the nodout of LS-DYNA, which has no internal energy; "
+            "name the glstat, matsum or binout of the run with it"
+        )
+
+
 def _reopen(
     sources: Sequence[Source],
     selection: Selection,
@@ -199,13 +207,13 @@ def _sort_by_format(
 ) -> tuple[dict[str, list[Source]], list[str]]:
     """Group the files of a run by format, and return notes on files that match a pattern but are not used.
 
-    Of a pattern, as of a folder, the energy histories are used; a table only if there is no database of a solver. The
-    later files of a family have the format of its first file.
+    Of the files that match a pattern or lie in a folder, the energy histories are used, but tables only if there is no
+    solver database. The later files of a family have the format of its first file.
 
     Raises
     ------
     FormatError
-        If a file that was named is no energy history, or no file of a pattern is.
+        If a file that the user named is not an energy history, or if no file of a pattern is one.
     """
     formats: dict[str, str] = {}
     foreign: list[tuple[Source, FormatError]] = []
@@ -305,8 +313,8 @@ def _open_legs_of_formats(
 ) -> tuple[dict[str, Sequence[Database]], tuple[str, ...]]:
     """Open the files by format; return the restart segments of each format, and notes on unused files.
 
-    d3plot families exist next to everything that LS-DYNA writes: they are used only if the other files leave
-    something out, and if there are other files, a family that cannot be read is not an error.
+    LS-DYNA always writes a d3plot family in addition to other files, so the family is used only for data that the other
+    files lack. If there are other files, a family that cannot be read is not an error.
     """
     opened: dict[str, Sequence[Database]] = {}
     notes = []
@@ -411,8 +419,9 @@ def check_companions(databases: Sequence[Legs]) -> None:
 def check_legs(legs: Sequence[Database]) -> None:
     """Raise FormatError if files of one format belong to different runs.
 
-    All restart segments of a run have the same quantities. A restart repeats the state with which it begins. Files that
-    begin at the same time are copies, or of different runs: then all states at common times are compared.
+    All restart segments of a run have the same quantities, and a restart repeats the state with which it begins. Files
+    that begin at the same time are either copies or files of different runs, so all their states at common times are
+    compared.
     """
     for first, second in combinations(legs, 2):
         held_by_first = _list_columns_and_parts(first)

@@ -13,8 +13,9 @@ if TYPE_CHECKING:
 class ResumePoint(NamedTuple):
     """The position at which a later read of a growing file can begin.
 
-    ``head`` followed by the bytes of the file from ``begin`` on is a file of the same format with the last states only.
-    ``end`` is the address after the last whole state: what was read behind it lacks some lines of a state.
+    ``head``, followed by the bytes of the file from ``begin`` on, is a file of the same format that contains only the
+    last states. ``end`` is the offset after the last complete state; in a state that was read after it, some lines are
+    missing.
     """
 
     head: bytes

@@ -59,10 +59,10 @@ NO_STATES: Final = "no states; did the run reach its first output?"
 class OpenedRun:
     """The databases of one run, one per format, with the most comprehensive first.
 
-    ``sources`` are the names of the files, ``files`` their contents. ``surroundings`` are the forces from outside.
-    ``reopen`` opens the same files again with other surroundings, which is how a run is copied to another process.
-    ``notes`` are on files that were not used; ``forces`` are those of files with forces only, and ``nodes`` are files
-    with the motion of nodes only.
+    ``sources`` contains the names of the files, and ``files`` their contents. ``surroundings`` describes the external
+    forces. ``reopen`` opens the same files again with other surroundings; it is used to copy a run to another process.
+    ``notes`` is about files that were not used. ``forces`` contains the forces in files that contain only forces, and
+    ``nodes`` the files that contain only the motion of nodes.
     """
 
     def __init__(
@@ -128,7 +128,7 @@ class OpenedRun:
     def history(self, selection: Selection) -> History:
         """Return the history of the selected energy: that of parts, of channels, or by default of the whole model.
 
-        Raises FormatError, with what there is, if something selected is missing.
+        Raises FormatError if a selected energy is missing; the message lists the available ones.
         """
         history = self._energy(selection)
         notes = (*history.notes, *self.unused_energies(selection))
@@ -161,7 +161,8 @@ class OpenedRun:
     ) -> tuple[Momenta, ...]:
         """Return the momenta of the parts and of the whole model, if the files contain them.
 
-        ``chosen`` are the parts to switch (None: all), ``flying`` those known to fly together, if any.
+        ``chosen`` contains the parts to be switched (None stands for all parts), and ``flying`` those that are known to
+        fly together, if any.
         """
         of_parts = self._part_momenta
         of_whole = self._whole_momentum
@@ -210,7 +211,8 @@ class OpenedRun:
     def masses(self) -> Samples | None:
         """Masses of the parts whose momenta are written, in the order of the momenta; NaN if a mass is unknown [mass].
 
-        As written, or momentum over velocity along the axis with most momentum; None if neither is written.
+        They are read from the file, or are the momentum divided by the velocity along the axis with the largest
+        momentum. The result is None if neither is written.
         """
         momenta = self._part_momenta
         holder = self._with_parts()
@@ -577,7 +579,7 @@ def _list_energy_channels(database: Legs, selection: Selection) -> list[str]:
 def _compute_median_of_nonzero(values: Samples) -> Samples:
     """Return the median of each column of values (n, k) over the states in which the column is not 0.
 
-    The mass of a rigid part is 0 in some states.
+    States in which a column is 0 are ignored, because the written mass of a part is 0 while it is rigid.
     """
     is_nonzero = values != 0
     if is_nonzero.all():

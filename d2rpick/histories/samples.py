@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 # A table has a row for each part and time if at least this fraction of its states repeat the previous time [-].
 _REPEATED: Final = 0.49
+# A note on times that step back begins with these words.
+STEPS_BACK: Final = "time steps back"
 # Smallest number of times that are examined, because equal times in fewer rows may be a coincidence.
 FEWEST_TIMES: Final = 3
 # Largest ratio of the output intervals before and after a restart [-]; unsorted tables and curves exceed it.
@@ -26,9 +28,9 @@ _ALIKE = 2.0
 _TOGETHER: Final = 8
 # A root has converged if its time changes by at most this fraction [-], which is about the rounding error.
 _STILL: Final = 8 * float(np.finfo(np.float64).eps)
-# Number of halvings of a bracket that are tested together if there are few brackets.
+# Number of halvings of a root bracket that are evaluated in one call if there are at most _FEW brackets.
 _HALVED_TOGETHER: Final = 5
-_FEW: Final = 100  # Largest number of brackets that are treated as few.
+_FEW: Final = 100  # Above this number of brackets, evaluating several halvings at once costs more than it saves.
 # Number of bisections that narrow a bracket to the rounding error.
 HALVINGS: Final = 50
 
@@ -97,20 +99,20 @@ def remove_line(time: Samples, values: Samples) -> Samples:
 def find_newest_states(time: Samples) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
     """Return a mask of the valid states of a file, and notes on the invalid states.
 
-    A state gives way to any later one at or before its time: of equal printed times the last one is valid, and after
-    a restart that steps back the newer leg is.
+    A state is replaced by any later state with an equal or earlier time: of several equal printed times, the last one
+    is valid, and after a restart that goes back in time, the newer restart segment is valid.
 
     Parameters
     ----------
     time : array of shape (n,)
-        Times in the order of the file [unit of the run].
+        Times in the order of the file [time].
 
     Returns
     -------
     keep : array of bool, shape (n,)
         ``time[keep]`` increases strictly.
     notes : tuple of str
-        A sentence for each kind of state left out.
+        A sentence for each kind of omitted state.
 
     Examples
     --------
@@ -138,7 +140,7 @@ def find_newest_states(time: Samples) -> tuple[NDArray[np.bool_], tuple[str, ...
         lost = int(np.count_nonzero(~keep)) - equal
         dropped = "1 older state was" if lost == 1 else f"{lost} older states were"
         notes.append(
-            f"time steps back {steps}, {place} (restart); the newer restart segment is used where they "
+            f"{STEPS_BACK} {steps}, {place} (restart); the newer restart segment is used where they "
             f"overlap, {dropped} dropped"
         )
     return keep, tuple(notes)
@@ -214,8 +216,8 @@ def find_crossings(
 ) -> tuple[Samples, NDArray[np.bool_]]:
     """Return the times (k,) at which ``energy`` crosses ``level``, ascending, and a mask (k,) of rising crossings.
 
-    Between samples the energy is linear: for piecewise linear data the result is exact to rounding. The energy
-    crosses the level if it is on different sides before and after:
+    The energy is assumed to be linear between samples; for piecewise linear data, the result is exact except for
+    rounding. The energy crosses the level if it is on different sides before and after:
 
     * a sample exactly on the level is one crossing, at that sample; a plateau on the level is one, at its first sample;
     * touching the level and turning back is no crossing (``find_turns`` gives such points);
@@ -262,7 +264,7 @@ def find_crossings(
 def find_turns(energy: Samples) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
     """Return the indices (k,) of the extrema of the energy (n,), and a mask (k,) of the maxima.
 
-    A flat top or bottom is one turn, at its first sample; the ends are no turns.
+    A flat top or bottom is a single extremum at its first sample; the ends are not extrema.
 
     Examples
     --------
@@ -346,8 +348,8 @@ def draw_outline(time: Samples, values: Samples, stretches: int) -> Samples:
     ----------
     time, values : array of shape (n,)
     stretches : int
-        Number of stretches of equally many samples.  The first and the last sample are kept too, so that m is at most
-        ``2 * stretches + 2``.
+        Number of intervals with equal numbers of samples. The first and last samples are also kept, so m is at most
+        twice ``stretches`` plus 2.
 
     Examples
     --------
@@ -373,13 +375,14 @@ def halve_brackets(
 ) -> Samples:
     """Halve the brackets around the times at which a test changes its result; return their ends ``within``.
 
-    Several halvings of a few brackets are tested at once, because few times cost as much as one time. The result is
-    that of single halvings.
+    For a few brackets, several halvings are tested at once, because testing a few times takes as long as testing one.
+    The result equals that of single halvings.
 
     Parameters
     ----------
     passes : callable
-        True at ``within`` and False at ``beyond``, for arrays of their shape with a further first axis.
+        Test that is True at ``within`` and False at ``beyond``; it accepts arrays of their shape with an additional
+        first axis.
     within, beyond : array
         Ends of the brackets, in either order.
     halvings : int
@@ -434,9 +437,9 @@ def narrow_brackets(
     Parameters
     ----------
     inside : callable
-        Returns values and their slopes, arrays for an array; the values are positive at ``within`` and not at
-        ``beyond``.  Newton steps are used if they stay within their bracket, and each root stays once it has converged,
-        so that it does not depend on the other roots searched with it.
+        Function that returns the values and slopes at an array of times; the values are positive at ``within`` and not
+        positive at ``beyond``. Newton steps are used if they stay within their bracket. A root no longer changes once
+        it has converged, so it does not depend on the roots that are searched for at the same time.
     within, beyond : array
         Ends of the brackets, in either order.
     steps : int

@@ -34,6 +34,8 @@ _NUMBER = r"\d+\.?\d*|\.\d+"
 # A table with this word in its first bytes is probably an energy history.
 _ENERGY_IN_HEAD: Final = b"energy"
 _HEAD_OF_TABLE: Final = 4096
+# Suffixes of decks. A folder with decks but no databases belongs to a run that has not been computed yet.
+_DECKS: Final = (".k", ".key", ".dyn", ".rad")
 
 # Pattern of a file name with or without the number of a restart segment (e.g. runT01, binout0001).
 _NUMBERED: Final = re.compile(r"(.*?)(\d*)(\.gz)?", re.DOTALL)
@@ -42,8 +44,8 @@ _NUMBERED: Final = re.compile(r"(.*?)(\d*)(\.gz)?", re.DOTALL)
 class Source(NamedTuple):
     """The unpacked bytes of one file, in memory or on disk, under the file name that the user gave.
 
-    ``cut`` is True if packed data ends early: ``data`` is what could be unpacked of ``packed``. ``by_pattern`` is
-    True if a pattern or folder matched the file, rather than its name.
+    ``cut`` is True if packed data is truncated; ``data`` is then the part of ``packed`` that could be unpacked.
+    ``by_pattern`` is True if the user gave a pattern or folder rather than the name of the file.
     """
 
     name: str
@@ -55,7 +57,7 @@ class Source(NamedTuple):
     def sha256(self) -> str:
         """Return the SHA-256 of the bytes as they were read, before unpacking.
 
-        Raises ChangedError if a large file was rewritten since.
+        Raises ChangedError if a large file was rewritten since then.
         """
         raw = self.data if self.packed is None else self.packed
         if not isinstance(raw, bytes):
@@ -68,12 +70,12 @@ class Source(NamedTuple):
 def expand(names: Sequence[str]) -> tuple[str, ...]:
     """Replace folders and patterns by the files that they contain or match, and keep the order of all others.
 
-    Of a folder only databases of solvers are used, and they must belong to one run.
+    Only the solver databases in a folder are used, and they must belong to one run.
 
     Raises
     ------
     FormatError
-        If a folder or glob has none, or a folder the T01 files of several runs.
+        If a folder or pattern yields no file, or if a folder contains the T01 files of several runs.
     """
     return tuple(dict.fromkeys(file for name in names for file in _list_files(name)))
 
@@ -84,7 +86,8 @@ def open_files(names: Sequence[str]) -> list[Source]:
     Raises
     ------
     FormatError
-        If a file cannot be read, or one of several was replaced or cut meanwhile, so that they may be of two runs.
+        If a file cannot be read, or if one of several files was replaced or truncated in the meantime, so that they may
+        belong to two runs.
     """
     files = expand(names)
     families = _open_families(files)  # The files of a family are checked at each read.
@@ -145,7 +148,7 @@ def open_source(name: str) -> Source:
     Raises
     ------
     FormatError
-        If there is nothing to read under this name.
+        If there is no readable file of this name.
     """
     data = _read_stdin() if name == STDIN else _read_file(name)
     source = _unpack(name, data) if data[:2] == _GZIP else Source(name, data)
@@ -205,10 +208,6 @@ def _list_later_files(name: str) -> Sequence[str]:
             numbers[sibling] = number
     in_order = sorted(numbers, key=numbers.__getitem__)
     return [os.path.join(folder, sibling) for sibling in in_order]  # noqa: PTH118  pathlib would slow down start-up
-
-
-# Suffixes of decks. A folder with decks but no databases belongs to a run that has not been computed yet.
-_DECKS: Final = (".k", ".key", ".dyn", ".rad")
 
 
 def _list_databases(folder: Path) -> list[str]:

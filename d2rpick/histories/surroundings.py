@@ -26,9 +26,9 @@ class Support(NamedTuple):
 class Surroundings:
     """External forces on each part, keyed by part id, and on the whole model, keyed by None.
 
-    ``gravity`` are the possible accelerations [length/time^2], with 0 if there are times without gravity; the
-    accelerations of a part that is not listed are unknown. ``bodies`` returns the groups of connected parts, () if
-    they are unknown.
+    ``gravity`` contains the possible accelerations [length/time^2], including 0 if there are times without gravity; the
+    accelerations of a part that is not listed are unknown. ``bodies`` returns the groups of connected parts; the result
+    is empty if they are unknown.
     """
 
     gravity: Mapping[int | None, tuple[float, ...]] = field(default_factory=dict)

@@ -1,9 +1,10 @@
 """Define the box, its step, the sled and the ground in their initial state, and the forces of the bars.
 
-The box is the cross-section of a thin-walled body in its plane of roll: an outer and an inner ring of mass points,
-connected by bars along both rings, across, and diagonally. So its walls bend, the frame racks, and it has twice as
-many modes as points. The step is a small truss at the foot of the leading side; only the step meets the curb. Vectors
-of the plane are complex numbers, x + i z: x forward, z up. SI units.
+The box is the cross-section of a thin-walled body in the plane in which it rolls. It consists of an outer and an inner
+ring of mass points, connected by bars along both rings, between the rings, and diagonally. Therefore its walls can
+bend, its frame can shear, and it has twice as many modes as points. The step is a small truss at the lower end of the
+leading side; only the step touches the curb. Vectors in the plane are complex numbers x + i z with x forward and z up.
+All quantities are in SI units.
 """
 
 from __future__ import annotations
@@ -35,8 +36,8 @@ _BARS = 5
 class Parameters:
     """Parameters of the box, sled and surroundings in SI units; raise RangeError for values that give no valid model.
 
-    The defaults are a narrow box on the standard dolly. They were tuned to two times of the published study, which
-    states no other figure of its model: the trip ends at about 85 ms, and the box lands at 380 ms.
+    The defaults describe a narrow box on the standard dolly. They were tuned to the two times that the published study
+    states about its model: the contact with the curb ends at about 85 ms, and the box lands at 380 ms.
     """
 
     speed: float = 7.0
@@ -127,8 +128,8 @@ class Truss(NamedTuple):
 class Structure(NamedTuple):
     """Points at ``places`` (n,) with ``masses``, of which the first ``of_box`` belong to the box, and all bars.
 
-    The points of the outer ring are listed first. ``skin`` are the points that may touch floor and ground, ``toes`` the
-    points that may meet the curb.
+    The points of the outer ring are listed first. ``skin`` contains the points that may touch the floor and the ground,
+    ``toes`` the points that may touch the curb.
     """
 
     places: Plane
@@ -143,7 +144,7 @@ class Structure(NamedTuple):
 def build_structure(parameters: Parameters) -> Structure:
     """Return the box and the step on the tilted floor of the sled, with the lower step point at the curb (the origin).
 
-    For a drop they are moved vertically to their height above the ground.
+    For a drop test, both are moved vertically to their height above the ground.
     """
     p = parameters
     ring = _make_ring(p.mesh)
@@ -225,8 +226,8 @@ def _list_bars_of_step(cells: int, top: int) -> list[tuple[int, int]]:
 class Bars:
     """The current state of the bars of a truss: lengths ``rest`` with plastic elongation [m], and ``plastic_work`` [J].
 
-    ``points`` is the number of points of the model. A bar depends only on its length, so after a phase in which its
-    points moved as one body it continues with the elongation it had, rotated with the body.
+    ``points`` is the number of points of the model. The force of a bar depends only on its length, so after a phase in
+    which its points moved as one rigid body, the bar continues with the same elongation, rotated with the body.
     """
 
     def __init__(self, truss: Truss, points: int) -> None:
@@ -262,7 +263,8 @@ class Bars:
     def elastic_energy(self, positions: Plane, rest: Values | None = None) -> Values:
         """Return the elastic energy of the bars, shape (...), for ``positions`` of shape (..., n) [J].
 
-        ``rest`` are the lengths at rest at that time, if they differ from the current lengths (..., bars) [m].
+        ``rest`` are the lengths at rest (..., bars) at the time of the positions, if they differ from the current ones
+        [m].
         """
         length = np.abs(positions[..., self._second] - positions[..., self._first])
         elongation = length - (self.rest if rest is None else rest)
@@ -283,12 +285,13 @@ class Bars:
 def compute_stiffest_rate(masses: Values, *trusses: Truss, extra: Values) -> float:
     """Return an upper bound on the angular frequencies of the model [1/s].
 
-    A bar of stiffness k between points whose masses are divided among their bars in proportion to the stiffness has
-    omega^2 = K_1/m_1 + K_2/m_2, with K the sum of the stiffnesses at a point; no mode of the model is faster than its
-    fastest bar. ``extra`` is the stiffness of contacts at the points [N/m].
+    If the mass m of each point is divided among its bars in proportion to their stiffness, a bar has omega^2 = K_1/m_1
+    + K_2/m_2, where K is the sum of the stiffnesses at a point. No mode of the model has a higher frequency than the
+    bar with the highest frequency. ``extra`` is the contact stiffness at the points [N/m].
     """
     at_point = extra.copy()
     for truss in trusses:
         np.add.at(at_point, truss.ends, truss.stiffness[:, np.newaxis])
-    rates = at_point / masses
-    return float(np.sqrt(max(rates[truss.ends].sum(axis=1).max() for truss in trusses)))
+    squares_at_points = at_point / masses
+    squares = [squares_at_points[truss.ends].sum(axis=1).max() for truss in trusses]
+    return float(np.sqrt(max(squares)))

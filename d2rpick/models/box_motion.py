@@ -1,9 +1,9 @@
 """Integrate the motion of the box by central differences, with contact, as a truss or as one rigid body.
 
-The contact force is proportional to the penetration; friction follows Coulomb's law, smoothed at small speeds. The
-cushion of the curb crushes like honeycomb: at a constant force, irreversibly, until its depth is used up. In a drop
-there is only the ground. While it is switched the box, alone or with its step, moves as one body, with three equations
-in the plane.
+The contact force is proportional to the penetration; friction follows Coulomb's law, smoothed at low speeds. The
+cushion of the curb crushes like honeycomb: irreversibly and at a constant force until its depth is used up. In a drop
+test, there is only the ground. While it is switched, the box, alone or with its step, moves as one rigid body, which
+has three equations of motion in the plane.
 """
 
 from __future__ import annotations
@@ -93,8 +93,8 @@ class Sled:
 class Contact:
     """The contact forces on the points of a structure; the depth to which the cushion is crushed is kept as state.
 
-    ``released`` is the last time at which the sled pushed before the first contact with the ground; ``landings`` are
-    the intervals (start, end) in which the ground pushed [s].
+    ``released`` is the last time at which the sled exerted a force before the first ground contact [s]; ``landings``
+    are the intervals (start, end) with ground contact [s].
     """
 
     def __init__(self, structure: Structure, parameters: Parameters) -> None:
@@ -105,11 +105,8 @@ class Contact:
         self._into_sled = complex(np.exp(1j * np.radians(parameters.tilt)))
         self._crushed = np.zeros(self._toes.size)
         self._sleeps_until = 0.0
-        self._fastest = (
-            FASTEST * parameters.speed
-            + FALL
-            + 2 * np.sqrt(2 * GRAVITY * (parameters.drop or 0.0))
-        )
+        drop_speed = np.sqrt(2 * GRAVITY * (parameters.drop or 0.0))
+        self._fastest = FASTEST * parameters.speed + FALL + 2 * drop_speed
         self.released: float | None = None
         self.landings: list[tuple[float, float]] = []
 
@@ -122,10 +119,9 @@ class Contact:
         if gap > 0:
             self._sleeps_until = time + gap / self._fastest
             return None
-        push = Push(
-            self._sled(time, on_sled, velocities),
-            self._on_all(self._ground(positions, velocities), self._skin),
-        )
+        of_sled = self._sled(time, on_sled, velocities)
+        of_ground = self._on_all(self._ground(positions, velocities), self._skin)
+        push = Push(of_sled, of_ground)
         if push.sled.normal.any() and not self.landings:
             self.released = time
         if push.ground.normal.any():
@@ -184,15 +180,14 @@ class Contact:
 
     def _curb(self, positions: Plane, sliding: Plane) -> Face:
         """Return the forces of the curb along -x [N], with friction along z; the curb acts like an upright floor."""
-        may_touch = (positions.imag < self._p.curb) & (
-            positions.real < self._p.cushion_depth + DEEPEST
-        )
+        is_low = positions.imag < self._p.curb
+        is_near = positions.real < self._p.cushion_depth + DEEPEST
+        may_touch = is_low & is_near
         depth = np.where(may_touch, np.maximum(positions.real, 0.0), 0.0)
         trial = STIFFNESS * np.maximum(depth - self._crushed, 0.0)
         yields = np.minimum(trial, self._p.cushion)
-        self._crushed = np.minimum(
-            self._crushed + (trial - yields) / STIFFNESS, self._p.cushion_depth
-        )
+        crushed = self._crushed + (trial - yields) / STIFFNESS
+        self._crushed = np.minimum(crushed, self._p.cushion_depth)
         normal = STIFFNESS * np.maximum(depth - self._crushed, 0.0)
         face = self._with_friction(normal, sliding.imag)
         return Face(np.asarray(1j * face.normal), np.asarray(1j * face.friction))
@@ -206,8 +201,8 @@ class Contact:
 class RigidPoints:
     """Points that move as one rigid body. At the switch, the body has the linear and angular momentum of the points.
 
-    ``arms`` from the centre of mass to the points, rotated with the body (n,) [m]; ``velocity`` of the centre [m/s];
-    ``spin`` from x to z [rad/s].
+    ``arms`` (n,) leads from the centre of mass to the points and rotates with the body [m]. ``velocity`` is that of the
+    centre of mass [m/s], and ``spin`` the angular velocity from x to z [rad/s].
     """
 
     def __init__(self, masses: Values, positions: Plane, velocities: Plane) -> None:
@@ -216,7 +211,8 @@ class RigidPoints:
         self.arms = positions - self.centre
         self._inertia = float(masses @ np.abs(self.arms) ** 2)
         self.velocity = complex(masses @ velocities) / self._mass
-        self.spin = float(np.vdot(masses * self.arms, velocities).imag) / self._inertia
+        angular_momentum = float(np.vdot(masses * self.arms, velocities).imag)
+        self.spin = angular_momentum / self._inertia
 
     @property
     def places(self) -> Plane:
@@ -248,10 +244,10 @@ class RigidPoints:
 class Accounts:
     """Energy and momentum exchanged with the surroundings since time zero.
 
-    ``external_work`` of gravity and the sled, ``friction`` work of all contacts, energy of the ``walls`` (stored in
-    floor, curb and ground, and dissipated by the cushion), ``damping`` energy, ``lost`` kinetic energy of the
-    vibration at tr [J]; ``impulse`` [kg m/s] and ``angular_impulse`` about the origin, from x to z [kg m2/s], of
-    gravity, contact and damping.
+    All energies are in J: ``external_work`` of gravity and the sled, ``friction`` work of all contacts, energy of the
+    ``walls`` (stored in floor, curb and ground, and dissipated by the cushion), ``damping`` energy, and ``lost``
+    kinetic energy of the vibration at tr. ``impulse`` [kg m/s] and ``angular_impulse`` about the origin, from x to z
+    [kg m2/s], are those of gravity, contact and damping.
     """
 
     external_work: float = 0.0
@@ -266,9 +262,9 @@ class Accounts:
 class BoxMotion:
     """The state of a run: ``places`` (n,) at time step ``count``, ``velocities`` (n,) half a time step earlier.
 
-    A time step ``dt`` [s] is 1/``every`` of the output ``interval``; RangeError is raised if impossible. ``body`` is
-    the rigid body while there is one, else None; it contains the points of the box, and those of the step if the step
-    is rigid too.
+    The time step ``dt`` [s] is 1/``every`` of the output ``interval``; RangeError is raised if there is no such time
+    step. ``body`` is the rigid body, or None while there is none; it contains the points of the box, and those of the
+    step if the step is rigid, too.
     """
 
     def __init__(self, parameters: Parameters, interval: float) -> None:
@@ -313,7 +309,7 @@ class BoxMotion:
     def make_rigid(self, *, with_step: bool = False) -> None:
         """Make the box rigid, alone or together with the step.
 
-        The rigid points keep their momenta, their vibration stops, and their deformation is frozen.
+        The rigid points keep their total momenta, their vibration stops, and their deformation is frozen.
         """
         frozen_bars = (self.box, self.step) if with_step else (self.box,)
         self._deformable_bars = () if with_step else (self.step,)

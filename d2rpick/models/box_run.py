@@ -40,16 +40,17 @@ _FINE, _COARSE, _LAST = 0.003, 0.004, 0.03
 class Record(NamedTuple):
     """States of a run at the times ``time`` (n,) in SI units; vectors are complex numbers x + i z.
 
-    Of the box: ``centre`` of mass and its ``velocity`` (n,), ``roll`` forward since time 0 [rad], ``omega`` [rad/s]
-    from the angular momentum. Of box and step: ``internal_energy``, ``kinetic_energy`` and ``momentum`` (n, 2). Of
-    the whole: ``external_work``, ``friction_energy``, ``wall_energy``, ``damping_energy`` and ``lost_energy`` at tr,
-    each since time 0 (n,). ``outline`` of the box (n, points), ``mass`` of box and step. ``released`` is the time at
-    which the sled pushed last before the first of ``landings``, None if it never did; ``landings`` are the intervals
-    in which the ground pushed. ``dt`` is the time step [s]; ``bar_updates`` and ``seconds`` are the cost of the run.
+    Columns of the box are its ``centre`` of mass and its ``velocity`` (n,), the forward ``roll`` since time 0 [rad],
+    ``omega`` from the angular momentum [rad/s], and the ``outline`` (n, points). Columns of the box and the step, (n,
+    2), are ``internal_energy``, ``kinetic_energy`` and ``momentum``; ``mass`` is that of both. Columns of the whole
+    model since time 0, (n,), are ``external_work``, ``friction_energy``, ``wall_energy``, ``damping_energy`` and
+    ``lost_energy`` at tr. ``landings`` are the intervals with ground contact, and ``released`` is the last time before
+    them at which the sled exerted a force, None if it never did. ``dt`` is the time step [s]; ``bar_updates`` and
+    ``seconds`` are the cost of the run.
 
-    Friction is what a solver reports as contact energy. Floor, curb and ground are softer than the box and yield by
-    centimetres; a solver would model them as rigid walls, springs or separate parts, so the energy stored in them and
-    dissipated by the cushion is kept apart from the contacts.
+    The friction energy corresponds to the contact energy that a solver reports. Floor, curb and ground are softer than
+    the box and deform by centimetres. A solver would model them as rigid walls, springs or separate parts, so the
+    energy that they store and that the cushion dissipates is not part of the contact energy.
     """
 
     time: Values
@@ -348,8 +349,8 @@ def make_history(record: Record) -> History:
 class Outcome(NamedTuple):
     """One switched run in comparison with the reference run.
 
-    ``energy`` is the energy of the box at tr, which is locked in [J], ``energy_ratio`` its ratio to the energy at td.
-    The errors at td are ``roll_error`` [degrees], ``x_error`` and ``z_error`` of the centre of mass [m], and
+    ``energy`` is the energy of the box at tr, which is frozen [J], and ``energy_ratio`` this energy divided by that at
+    td. The errors at td are ``roll_error`` [degrees], ``x_error`` and ``z_error`` of the centre of mass [m], and
     ``omega_error`` [rad/s].  ``lost_energy`` is the kinetic energy of the vibration at tr [J].  ``mean_ratio`` is the
     ratio of the mean energy of the box from td to the landing to the same mean in the reference run.
     """
@@ -401,7 +402,7 @@ def scan(
 ) -> Iterator[Outcome]:
     """Yield the outcome of a switched run for each of ``times``, in ascending order of tr.
 
-    All runs equal the reference run until their tr, so that part is computed only once.  Then ``jobs`` processes share
+    All runs equal the reference run until their tr, so this part is computed only once. Then ``jobs`` processes share
     the runs (None: one process for each core; 1: only this process).
     """
     end = find_comparison_end(reference, td)

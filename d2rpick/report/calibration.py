@@ -16,11 +16,16 @@ if TYPE_CHECKING:
     from d2rpick.report.formats import DisplayOptions, RepeatedQuestion
 
 _LEG: Final = row(
-    Field("name", "text"),
-    Field("counts", each("number")),
-    Field("rigid_nodes", "number"),
-    Field("step_time", "number", get=lambda leg: leg.total),
-    Field("element_time", "number?", get=lambda leg: leg.elements),
+    Field("name", "text", "name of the engine run or restart segment"),
+    Field("counts", each("number"), "number of deformable elements by formulation"),
+    Field("rigid_nodes", "number", "number of nodes of rigid bodies"),
+    Field("step_time", "number", "CPU time of one time step", lambda leg: leg.total),
+    Field(
+        "element_time",
+        "number?",
+        "CPU time that the elements take in one time step; null if the solver lists only the total",
+        lambda leg: leg.elements,
+    ),
 )
 DOCUMENT: Final = Document("d2rpick/calibrate/1", "Answer of d2rpick calibrate; times in us per cycle.", row(
     keys.WARNINGS,
@@ -29,8 +34,8 @@ DOCUMENT: Final = Document("d2rpick/calibrate/1", "Answer of d2rpick calibrate; 
     Field("rigid_node", "number", "cost of a node of a rigid body", lambda ours: ours.weights.rigid_node),
     Field("per_element", each("number"), "cost of an element by formulation", lambda ours: ours.weights.per_element),
     Field("told", "texts", "costs that these runs determine; the other costs keep the built-in ratio"),
-    Field("misfit", "number"),
-    Field("legs", many(_LEG)),
+    Field("misfit", "number", "rms difference between measured and fitted CPU times, relative to the measured times"),
+    Field("legs", many(_LEG), "engine runs or restart segments to which the costs were fitted"),
 ), closed=True)  # fmt: skip
 HEAD = ("formulation", "weight [us]", "built-in [us]", "source")
 COLUMNS = ("formulation", "weight", "measured", "told")

@@ -111,15 +111,19 @@ def list_numbered_reasons(numbers: Mapping[str, int]) -> Lines:
 
 def format_in_full(decision: Decision) -> str:
     """Return the verdict, the reason why it is not better, what would improve it, and what to expect after td."""
-    verdict = f"{decision.verdict}: {decision.reason}"
+    return f"{decision.verdict}: {decision.reason}. {format_outlook(decision)}"
+
+
+def format_outlook(decision: Decision) -> str:
+    """Return what would improve a pair that is not good, and what to expect after td."""
     expectation = f"Expect: {describe_expectation(decision)}"
     if decision.grade == GOOD:
-        return f"{verdict}. {expectation}"
-    return f"{verdict}. To improve: {decision.cure}. {expectation}"
+        return expectation
+    return f"To improve: {decision.cure}. {expectation}"
 
 
 def format_rigid_time(best: Candidate) -> str:
-    """Return the time for which the parts are rigid as text."""
+    """Format the time for which the parts are rigid."""
     return f"{best.rigid_time:.6g}, {best.rigid_fraction:.0%} of the simulated time"
 
 

@@ -15,19 +15,19 @@ if TYPE_CHECKING:
 _WINDOW: Final = row(
     Field("free", "number", "time from which no force acts"),
     Field("wait", "number", "force-free time"),
-    Field("tr", "number"), Field("td", "number"),
+    keys.TR, keys.TD,
     Field("contact", "number?", "first contact of the rigid body; null if the run ended before a contact"),
     Field("reason", "text?", "reason why the parts were not switched in this flight; null if the parts were switched"),
 )  # fmt: skip
 _LEG: Final = row(
     Field("kind", "text", "load, probe or rigid", lambda leg: leg.order.kind),
-    Field("length", "number"),
-    Field("cycles", "integer?"),
+    Field("length", "number", "simulated time of the engine run"),
+    Field("cycles", "integer?", "number of time steps; null if unknown"),
     Field("cpu", "number?", "CPU time [s]"),
 )
 DOCUMENT: Final = Document("d2rpick/drive/1", "Answer of d2rpick drive; times in the unit of the deck.", row(
     keys.WARNINGS,
-    Field("windows", many(_WINDOW)),
+    Field("windows", many(_WINDOW), "one entry for each flight, in the order of time"),
     Field("legs", many(_LEG), "engine runs in the order of computation, including the discarded ones"),
     Field("saved_by_model", "number?", "saved fraction of the CPU time of a deformable run, according to the cost "
           "model",

@@ -1,7 +1,7 @@
 """Define the fields of results: the type, the meaning and the source of the value for each key.
 
 A row of fields determines the JSON of an object, its CSV row, the columns of a frame, and the schemas in
-``d2rpick/schemas``.  Keys are only ever added.
+``d2rpick/schemas``.  Within one schema number, keys are only added.
 """
 
 from __future__ import annotations
@@ -192,9 +192,11 @@ class Document(NamedTuple):
     def whole(self) -> Kind:
         """The type of an object with all fields of the document."""
         head = (
-            Field("schema", Kind({"const": self.name})),
-            Field("tool_version", "text"),
-            Field("command", "texts"),
+            Field(
+                "schema", Kind({"const": self.name}), "name and number of the schema"
+            ),
+            Field("tool_version", "text", "version of d2rpick"),
+            Field("command", "texts", "arguments that reproduce the answer"),
         )
         schema = self.row.schema
         later = {*self.row.keys} - {*schema["required"]}

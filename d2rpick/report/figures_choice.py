@@ -46,11 +46,11 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
 
+    from d2rpick.base.spans import Times
     from d2rpick.choice.answers import PairSuggestion, PairVerdict
     from d2rpick.choice.pair.candidates import Candidate, Pair
     from d2rpick.choice.pair.situation import Situation
     from d2rpick.choice.parts.sets_of_parts import Parts
-    from d2rpick.choice.switched.switched_run import Times
     from d2rpick.choice.td.plan import PlannedFlight, RunPlan
     from d2rpick.choice.td.trade_off import TradeOff
     from d2rpick.histories.history import History, Samples

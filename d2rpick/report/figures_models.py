@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from d2rpick.vibration.oscillator import Replay, Trajectory
 
 
-# Number of outlines of the rolling box, which is small so that the outlines can be distinguished.
+# Number of outlines that are drawn of the rolling box; it is small so that they can be told apart.
 _OUTLINES = 8
 
 _SLED_LENGTH: Final = 1.6

@@ -87,14 +87,16 @@ def _describe_states(news_before: News, news: News, plan: str) -> Iterator[Event
 
 def _describe_first_read(news: News, plan: str) -> str:
     """Report how far the run is at the first read; if it seems over, refer to the command ``plan``."""
-    message = f"the run has reached {news.now:.6g}"
+    reached = f"the run has reached {news.now:.6g}"
     if news.ending:
-        message += f" and has ended {news.ending}"
+        message = f"{reached} and has ended {news.ending}"
     elif news.silence:
-        message += f" and seems over: nothing was written for {news.silence:.0f} s"
+        message = (
+            f"{reached} and seems over: nothing was written for {news.silence:.0f} s"
+        )
     else:
-        return message
-    return f"{message}; choose times with {plan}, because the events below are past"
+        return reached
+    return f"choose times with {plan}: {message}, so the events below are past"
 
 
 def _describe_event(event: RunEvent, *, is_past: bool) -> Event:
@@ -114,7 +116,7 @@ def _describe_event(event: RunEvent, *, is_past: bool) -> Event:
     else:
         message = _describe_advice(event, flight.wait)
         if is_past:
-            message = f"during the run the advice was: {message}"
+            message = f"advice that came during the run: {message}"
     wait = flight.wait.time
     return Event(event.event, event.time, event.seen, message, wait, left, event.tr)
 

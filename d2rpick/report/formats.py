@@ -32,6 +32,8 @@ FORMATS: Final[Mapping[str, Sequence[str]]] = {
     "rollover": PLAIN,
     "findings": (*PLAIN, "ndjson", "github", "junit", "sarif"),
 }
+# Modules that write only the table of a result, without the imports that its other formats need.
+_TABLES: Final = {"findings": "findings_table"}
 
 
 class WrittenDeck(NamedTuple):
@@ -64,6 +66,8 @@ class RepeatedQuestion(NamedTuple):
         Files of the history.
     card : tuple of str
         Options of the card, which only a command that prints a card accepts.
+    unused_deck : str
+        Main deck that the user named but that belongs to another model; empty if there is none.
     """
 
     times: tuple[str, ...] = ()
@@ -73,6 +77,7 @@ class RepeatedQuestion(NamedTuple):
     checking: tuple[str, ...] = ()
     files: tuple[str, ...] = ()
     card: tuple[str, ...] = ()
+    unused_deck: str = ""
 
 
 class DisplayOptions(NamedTuple):
@@ -105,8 +110,9 @@ def write(result: str, form: str, answer: Any, display: DisplayOptions) -> str:
     >>> list(FORMATS["suggestion"])
     ['table', 'json', 'csv', 'markdown', 'ndjson', 'value']
     """
+    module = _TABLES.get(result, result) if form == "table" else result
     return write_by_module(
-        import_module(f"d2rpick.report.{result}"), form, answer, display
+        import_module(f"d2rpick.report.{module}"), form, answer, display
     )
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final, Protocol
 
 from d2rpick.choice.pair.grades import DO_NOT_USE, USE, USE_WITH_CARE
 from d2rpick.flight import SOURCES
-from d2rpick.report.fields import Field, Kind, get_kind, many, maybe, one_of, row
+from d2rpick.report.fields import Field, get_kind, many, maybe, one_of, row
 from d2rpick.vibration import MODELS
 
 if TYPE_CHECKING:
@@ -24,19 +24,32 @@ BASIS: Final = one_of(*MODELS)
 KIND: Final = one_of("crossing", "start", "extremum", "match")
 
 WARNING: Final = row(
-    Field("code", get_kind("text", pattern="^[a-z0-9-]+$")),
-    Field("message", "text"),
+    Field(
+        "code", get_kind("text", pattern="^[a-z0-9-]+$"), "stable code of the warning"
+    ),
+    Field("message", "text", "text of the warning"),
     name="warning",
 )
-WARNINGS: Final = Field("warnings", many(WARNING), get=lambda answer: answer.cautions)
-PART: Final = row(Field("id", "integer"), Field("title", "text"), name="part")
-TIMES: Final = row(Field("tr", "number"), Field("td", "number"))
+WARNINGS: Final = Field(
+    "warnings",
+    many(WARNING),
+    "warnings about the answer",
+    lambda answer: answer.cautions,
+)
+PART: Final = row(
+    Field("id", "integer", "part number"),
+    Field("title", "text", "part title"),
+    name="part",
+)
+TR: Final = Field("tr", "number", "time at which the parts become rigid")
+TD: Final = Field("td", "number", "time at which the parts become deformable again")
+TIMES: Final = row(TR, TD)
 PAIR: Final = row(
-    Field("td", "number"), Field("tr", "number"), Field("residual", "size?")
+    TD, TR, Field("residual", "size?", "residual of this pair; null if unknown")
 )
 WINDOW: Final = row(
-    Field("start", "number"),
-    Field("end", "number"),
+    Field("start", "number", "first tr of the range"),
+    Field("end", "number", "last tr of the range"),
     Field("share", "number", "length as a fraction of the flight up to td"),
 )
 
@@ -47,25 +60,31 @@ WEIGHTS: Final = (
     Field("sha256", "text?", "SHA-256 of this file", lambda weights: weights.file.sha256() if weights.file else None),
 )  # fmt: skip
 HISTORY: Final = row(
-    Field("source", get_kind("texts", minItems=1)),
+    Field("source", get_kind("texts", minItems=1), "files of the history"),
     Field("sha256", many(get_kind("text", pattern="^[0-9a-f]{64}$")), "SHA-256 of each source, in the same order",
           lambda history: [file.sha256() for file in history.files]),
-    Field("format", "text"),
+    Field("format", "text", "file format, such as matsum"),
     Field("channel", "text", "channel that is used as internal energy"),
     Field("parts", maybe(many(PART)), "parts whose energies were added; null for the whole model, or for columns"),
-    Field("states", get_kind("integer", minimum=3), get=lambda history: int(history.time.size)),
-    Field("time_start", "number", get=lambda history: history.start),
-    Field("time_end", "number", get=lambda history: history.end),
+    Field("states", get_kind("integer", minimum=3), "number of states", lambda history: int(history.time.size)),
+    Field("time_start", "number", "time of the first state", lambda history: history.start),
+    Field("time_end", "number", "time of the last state", lambda history: history.end),
     Field("complete", "flag", "false if the file ends within a state"),
-    Field("notes", "texts"),
+    Field("notes", "texts", "what was left out or assumed when the files were read"),
     Field("energy_unit", "text", "unit of the energies; empty if no file contains it", later=True),
     name="history",
 )  # fmt: skip
 _SOURCE: Final = one_of(*SOURCES)
 FLIGHT: Final = row(
-    Field("start", "number?"),
+    Field(
+        "start",
+        "number?",
+        "start of the flight, at the end of the load; null if no flight was found",
+    ),
     Field("end", "number?", "time of the next contact; null if none was found"),
-    Field("source", maybe(_SOURCE)),
+    Field(
+        "source", maybe(_SOURCE), "evidence for the flight; null if no flight was found"
+    ),
     Field(
         "certain",
         "flag",
@@ -79,12 +98,14 @@ FLIGHT: Final = row(
     name="flight",
 )
 OSCILLATOR: Final = row(
-    Field("omega", "number?"), Field("alpha", "number?"), Field("energy_plastic", "number?"),
+    Field("omega", "number?", "damped angular frequency of the deformation [1/time]"),
+    Field("alpha", "number?", "rate at which the vibration energy decays [1/time]"),
+    Field("energy_plastic", "number?", "constant energy of plastic work"),
     Field("preload", "number?", "square root of the preload energy"),
     Field("misfit", "number?", "rms(E - fit)/std(E) in the fitted interval"),
-    Field("source", one_of("identified", "given")),
-    Field("describes_record", "flag"),
-    Field("reason", "text?"),
+    Field("source", one_of("identified", "given"), "fitted to the record (identified) or given by options"),
+    Field("describes_record", "flag", "true if the oscillator describes the record well enough to be used"),
+    Field("reason", "text?", "reason why the oscillator does not describe the record; null if it does"),
     name="oscillator",
 )  # fmt: skip
 # JSON fields with the position error of a rigid body at td, which is estimated from the motion of its parts.
@@ -102,40 +123,72 @@ _POSITION: Final = (
           "true if the position error may be larger: an internal motion that is slower than the flight, or that bends "
           "the body, looks like a rotation; null if unknown", later=True),
 )  # fmt: skip
-# Type of deprecated keys of single parts. They are null for one version before they are removed.
-_NO_VALUE: Final = Kind({"type": "null"})
-NO_PARTS: Final = Field("parts", get_kind("texts", maxItems=0),
-                        "deprecated: always empty, since parts are not compared one by one", lambda _: ())  # fmt: skip
 # All values of a candidate. New values are added at the end, so that the CSV columns keep their order.
 CANDIDATE: Final = row(
-    Field("rank", get_kind("integer", minimum=1)),
-    Field("tr", "number"),
-    Field("kind", KIND),
-    Field("energy", "number"),
-    Field("level_ratio", "number?", "E(tr)/E(td)"),
-    Field("level_error", "size?"),
-    Field("rising", "flag?", "true if the energy increases at tr; null at an extremum"),
-    Field("sign_match", "flag?"),
-    Field("lock_in_error", "size?"),
-    Field("residual", "size?"),
     Field(
-        "part_mismatch",
-        _NO_VALUE,
-        "deprecated: always null, since parts are not compared one by one",
-        lambda _: None,
+        "rank",
+        get_kind("integer", minimum=1),
+        "position in the order from best to worst, starting at 1",
     ),
-    Field("rigid_time", get_kind("number", exclusiveMinimum=0)),
-    Field("rigid_fraction", get_kind("number", exclusiveMinimum=0, maximum=1)),
-    Field("timing_tolerance", "size?"),
-    Field("tr_low", "number?"),
-    Field("tr_high", "number?"),
+    TR,
+    Field(
+        "kind",
+        KIND,
+        "how tr was found: crossing (the energy crosses its level at td), extremum (extremum of the energy near this "
+        "level), match (deformation of several modes similar to td), or start (start of a flight in which nothing "
+        "vibrates)",
+    ),
+    Field("energy", "number", "internal energy at tr"),
+    Field("level_ratio", "number?", "E(tr)/E(td)"),
+    Field(
+        "level_error",
+        "size?",
+        "absolute difference between 1 and the square root of level_ratio",
+    ),
+    Field("rising", "flag?", "true if the energy increases at tr; null at an extremum"),
+    Field(
+        "sign_match",
+        "flag?",
+        "true if the deformations at tr and td have the same direction; null if unknown",
+    ),
+    Field(
+        "lock_in_error",
+        "size?",
+        "frozen-deformation error L, relative to the vibration amplitude at td",
+    ),
+    Field(
+        "residual",
+        "size?",
+        "residual R: relative error of the vibration after td; null if unknown",
+    ),
+    Field("rigid_time", get_kind("number", exclusiveMinimum=0), "td minus tr"),
+    Field(
+        "rigid_fraction",
+        get_kind("number", exclusiveMinimum=0, maximum=1),
+        "rigid_time as a fraction of the simulated time",
+    ),
+    Field(
+        "timing_tolerance",
+        "size?",
+        "time by which tr may be shifted before L grows by 0.05",
+    ),
+    Field(
+        "tr_low",
+        "number?",
+        "lower bound of tr, from the output interval and the number of digits",
+    ),
+    Field(
+        "tr_high",
+        "number?",
+        "upper bound of tr, from the output interval and the number of digits",
+    ),
     Field(
         "acceptable",
         "flag",
         "true if tr is admissible, and the residual is at most 0.5 or unknown",
     ),
-    Field("recommended", "flag"),
-    Field("notes", "texts"),
+    Field("recommended", "flag", "true for the recommended tr"),
+    Field("notes", "texts", "reasons why tr is not admissible, and remarks"),
     Field(
         "run_time_share",
         "size?",
@@ -172,7 +225,6 @@ _FIRST: Final = (
         "residual_low",
     ),
     *(
-        "part_mismatch",
         "timing_tolerance",
         "rigid_time",
         "rigid_fraction",
@@ -182,13 +234,6 @@ _FIRST: Final = (
 MEASURES: Final = (
     *_FIRST,
     *(key for key in CANDIDATE.keys if key not in (*_OF_TR, *_FIRST)),
-)
-# Keys that older results of ``suggest`` and ``verify`` lack.
-LATER: Final = (
-    "run_time_share",
-    "same_swing",
-    "residual_high",
-    *(field.key for field in _POSITION),
 )
 GRADE: Final = maybe(one_of("good", "fair", "poor"))
 VERDICT: Final = one_of(USE, USE_WITH_CARE, DO_NOT_USE)
@@ -242,29 +287,30 @@ QUALITY: Final = (
 EXPECTED: Final = Field("expected", maybe(row(
     Field("mean_energy", "number", "mean of the energy in the flight"),
     Field("resting_energy", get_kind("number", minimum=0), "lowest energy in the flight: the static energy"),
-    Field("kinetic_share", SHARE),
+    Field("kinetic_share", SHARE, "estimated kinetic fraction K at td"),
     Field("ratio", "size?", "mean energy after td divided by the mean energy of the reference run, for the "
                             "recommended tr"),
     Field("ratio_low", "size?", "the same ratio, without static energy"),
     Field("ratio_at_level", "number", "the same ratio, for a tr at which the energy equals the energy at td"),
 )), "estimates for a vibration of many modes, if the basis is energy")  # fmt: skip
 HEALTH: Final = Field("health", maybe(row(
-    Field("hourglass_share", "size?"),
+    Field("hourglass_share", "size?", "hourglass energy of the model"),
     Field("part_hourglass_share", "size?", "hourglass energy of the worst of the chosen parts, relative to the peak "
                                            "internal energy of this part"),
-    Field("part", maybe(row(*PART.fields))),
-    Field("energy_ratio_min", "number?", "total energy divided by initial energy and external work"),
-    Field("energy_ratio_max", "number?"),
+    Field("part", maybe(row(*PART.fields)), "the chosen part with the largest part_hourglass_share"),
+    Field("energy_ratio_min", "number?", "smallest ratio of the total energy to initial energy and external work"),
+    Field("energy_ratio_max", "number?", "largest ratio of the total energy to initial energy and external work"),
     Field("sliding_share", "size?", "contact energy, without friction energy if the file lists it separately"),
-    Field("negative_sliding_share", "size?"),
-    Field("eroded_share", "size?"),
-    Field("window", "span?"),
+    Field("negative_sliding_share", "size?", "largest negative contact energy, as a positive number"),
+    Field("eroded_share", "size?", "energy of eroded elements"),
+    Field("window", "span?", "interval to which the keys window_... refer: the rigid window, or the flight"),
     Field("window_sliding", "size?", "change of the contact energy in the window, relative to the mean energy of the "
                                      "chosen parts in the window"),
     Field("window_work", "size?", "external work in the window beyond gravity and damping, relative to the mean "
                                   "energy of the chosen parts in the window"),
-    Field("window_eroded", "size?"),
-    Field("reason", "text?"),
+    Field("window_eroded", "size?", "increase of the eroded energy in the window, relative to the mean energy of the "
+                                    "chosen parts in the window"),
+    Field("reason", "text?", "reason why values are null although the files contain energies"),
     Field("window_reason", "text?", "reason why the work in the window is not judged"),
     Field("until", "number?", "time up to which the run was checked: td, or the end of the run for info"),
     name="health", later=("part_hourglass_share", "part", "until"),
@@ -289,11 +335,17 @@ def _list_files_once(files: Iterable[Read]) -> dict[str, Read]:
 
 
 FILES: Final = (
-    Field("source", "texts", get=lambda answer: _list_files_once(answer.files)),
+    Field(
+        "source",
+        "texts",
+        "files of the deck, main file first",
+        lambda answer: _list_files_once(answer.files),
+    ),
     Field(
         "sha256",
         "texts",
-        get=lambda answer: [
+        "SHA-256 of each source, in the same order",
+        lambda answer: [
             file.sha256() for file in _list_files_once(answer.files).values()
         ],
     ),
@@ -316,7 +368,8 @@ def _get_weights(answer: Any) -> Weights | None:
 # Fields at the beginning of the JSON output of every answer about a history.
 FRAME: Final = (
     WARNINGS,
-    Field("history", HISTORY, get=lambda answer: _get_history_holder(answer).history),
+    Field("history", HISTORY, "history that the answer is based on",
+          lambda answer: _get_history_holder(answer).history),
     Field("deck", maybe(row(*FILES, closed=True)),
           "files of the deck that the answer is based on, main file first; null without --deck, or if nothing in the "
           "deck is used",
@@ -347,18 +400,22 @@ def _get_modes(situation: Situation) -> list[dict[str, float]] | None:
     return [mode._asdict() for mode in modal.modes_at(situation.td)] if modal else None
 
 
-# JSON fields of a situation at td.
+_MODE: Final = row(
+    Field("omega", "number", "damped angular frequency of the deformation [1/time]"),
+    Field("alpha", "number", "rate at which the energy of the mode decays [1/time]"),
+    Field("vibration_energy_td", "number", "vibration energy of the mode at td"),
+)
+# JSON fields that describe the vibration and the flight at td.
 MECHANICS: Final = row(
-    Field("energy_td", "number"),
-    Field("kinetic_share", maybe(SHARE)),
+    Field("energy_td", "number", "internal energy at td"),
+    Field("kinetic_share", maybe(SHARE), "kinetic fraction K: fraction of the vibration energy that is kinetic at td"),
     Field("kinetic_share_estimated", "flag",
           "true if kinetic_share comes from the modes of the structure or from counted cycles, not from an oscillator",
           lambda now: now.vibration.estimated is not None),
-    Field("basis", BASIS),
+    Field("basis", BASIS, "model of the vibration on which the choice is based"),
     Field("flight", FLIGHT, "free flight"),
-    Field("oscillator", maybe(OSCILLATOR), get=_get_oscillator),
-    Field("modes", maybe(many(row(*(Field(key, "number") for key in ("omega", "alpha", "vibration_energy_td"))))),
+    Field("oscillator", maybe(OSCILLATOR), "fit of one oscillator to the record; null if none was fitted",
+          _get_oscillator),
+    Field("modes", maybe(many(_MODE)),
           "modes of basis modal, sorted by angular frequency; null for other bases", _get_modes),
-    Field("unsigned_parts", _NO_VALUE,
-          "deprecated: always null, since parts are not compared one by one", lambda _: None),
 )  # fmt: skip

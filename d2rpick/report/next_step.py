@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
+from d2rpick.base.errors import list_names
 from d2rpick.choice.pair.grades import DO_NOT_USE
+from d2rpick.deck.beside import find_deck_beside
 from d2rpick.report.tables import make_positional, quote_shell_line
 
 if TYPE_CHECKING:
@@ -24,16 +26,45 @@ _SOME_PART: Final = "1"
 _SOME_NODE: Final = "1001"
 # Placeholders for the main deck in a command if the user has to name it, and for the folder of its copy.
 _SOME_DECK: Final = "DECK"
+_SOME_HISTORY: Final = "HISTORY"
 _FOLDER: Final = "switched"
 # Word for the parts that fly together, as in `d2rpick.flight.momentum`, which is slow to import.
 _FLYING: Final = "flying"
 # Statement of the last step, when the pairs of all flights have been compared.
 _NO_PAIR: Final = "no pair of this run can be used"
+# Options that can be the reason why no pair can be used.
+_LIMITS: Final = (
+    "--after",
+    "--landing",
+    "--margin",
+    "--max-kinetic-share",
+    "--max-residual",
+    "--min-quality",
+    "--min-rigid",
+    "--tolerance",
+)
 # Reason why the card of several parts needs the main deck.
 _NEEDS_DECK: Final = (
-    f" (main deck of the run instead of {_SOME_DECK}; "
-    "without it, parts that share nodes become separate rigid bodies)"
+    f"main deck of the run instead of {_SOME_DECK}; "
+    "without it, parts that share nodes become separate rigid bodies"
 )
+
+
+class NamedDeck(NamedTuple):
+    """Main deck in the next command, and a hint to replace a placeholder; the hint is empty if the deck was found."""
+
+    name: str
+    hint: str
+
+
+def name_deck_of_run(
+    question: RepeatedQuestion,
+    hint: str = f"main deck of the run instead of {_SOME_DECK}",
+) -> NamedDeck:
+    """Return the main deck next to the history or, if there is none or decks are excluded, a placeholder."""
+    is_excluded = "--no-deck" in question.options
+    deck = None if is_excluded else find_deck_beside(question.files)
+    return NamedDeck(deck, "") if deck else NamedDeck(_SOME_DECK, f" ({hint})")
 
 
 def write_command(
@@ -57,9 +88,10 @@ def needs_deck(history: History, settings: Settings) -> bool:
 
 def name_step_to_deck(question: RepeatedQuestion) -> str:
     """Return a text with the command that writes a copy of the main deck with the cards of a plan."""
-    words = ("--deck", _SOME_DECK, "--write-deck", _FOLDER)
+    deck = name_deck_of_run(question, _NEEDS_DECK)
+    words = ("--deck", deck.name, "--write-deck", _FOLDER)
     line = write_command(_allow_deck(question), "plan", *question.times, *words)
-    return f"write a copy of the deck with the cards: {line}{_NEEDS_DECK}. Then run the deck in {_FOLDER} from t = 0"
+    return f"write a copy of the deck with the cards: {line}{deck.hint}. Then run the deck in {_FOLDER} from t = 0"
 
 
 def _allow_deck(question: RepeatedQuestion) -> RepeatedQuestion:
@@ -82,7 +114,7 @@ def name_step_to_card(
 
     If the files show which parts are ``flying`` but no part or energy was chosen, the step is to choose the parts.
     """
-    from d2rpick.deck.printing import SOLVERS, find_solver
+    from d2rpick.deck.printing import SOLVERS, find_solver, names_solver
 
     is_radioss = SOLVERS[find_solver(history.format)].switches == "node"
     is_chosen = question.parts or "--energy" in question.options
@@ -107,10 +139,14 @@ def name_step_to_card(
         hint = f" (main nodes of your rigid bodies instead of {_SOME_NODE})"
     elif not history.parts:
         words = (*words, "--part", _SOME_PART)
-        hint = f" (ids of your parts instead of {_SOME_PART}; add --merge ID if parts share nodes)"
+        of_radioss = ""
+        if not names_solver(history.format):
+            of_radioss = f"; for a Radioss run, --solver radioss --node {_SOME_NODE} instead of --part {_SOME_PART}"
+        hint = f" (ids of your parts instead of {_SOME_PART}; add --merge ID if parts share nodes{of_radioss})"
     elif needs_deck(history, settings):
-        words = (*words, "--deck", _SOME_DECK)
-        hint = _NEEDS_DECK
+        deck = name_deck_of_run(question, _NEEDS_DECK)
+        words = (*words, "--deck", deck.name)
+        hint = deck.hint
         question = _allow_deck(question)
     words = (*words, *question.card)
     if command == "card":
@@ -158,10 +194,23 @@ def _keep_td(times: Sequence[str]) -> Sequence[str]:
 def _name_step_to_better_record(decision: Decision, question: RepeatedQuestion) -> str:
     """Return the step after a pair that the record cannot support: the deck of the run, or a change of the record."""
     if decision.needs_deck:
-        words = (*_keep_td(question.times), "--deck", _SOME_DECK)
+        deck = name_deck_of_run(question)
+        words = (*_keep_td(question.times), "--deck", deck.name)
         line = write_command(_allow_deck(question), "suggest", *words)
-        return f"judge the run with its deck: {line} (main deck of the run instead of {_SOME_DECK})"
+        return f"judge the run with its deck: {line}{deck.hint}"
     return f"improve the record: {decision.cure}; no pair of it can be used before"
+
+
+def name_lack_of_pairs(question: RepeatedQuestion) -> str:
+    """Return the statement that no pair of the run can be used, with the given options that may be the reason."""
+    words = (*question.times, *question.options)
+    limits = [
+        f"{name} {words[words.index(name) + 1]}" for name in _LIMITS if name in words
+    ]
+    if not limits:
+        return _NO_PAIR
+    values = "another value" if len(limits) == 1 else "other values"
+    return f"{_NO_PAIR} with {list_names(limits)} ({values} may allow one)"
 
 
 def name_way_out_of_run(answer: PairSuggestion, question: RepeatedQuestion) -> str:
@@ -171,18 +220,19 @@ def name_way_out_of_run(answer: PairSuggestion, question: RepeatedQuestion) -> s
     """
     situation = answer.situation
     is_chosen = question.parts or "--energy" in question.options
+    no_pair = name_lack_of_pairs(question)
     if situation.flight.by_parts and not is_chosen:
         line = write_command(question, "plan", new_parts=[_FLYING])
         return (
-            f"{_NO_PAIR} with all parts; judge the parts that fly together with {line}"
+            f"{no_pair} with all parts; judge the parts that fly together with {line}"
         )
     cure = answer.decision.cure_without_other_times if answer.decision else ""
     if cure:
-        return f"{_NO_PAIR}: {cure}"
+        return f"{no_pair}: {cure}"
     if situation.history.parts:
         line = write_command(question._replace(parts=()), "parts")
-        return f"{_NO_PAIR} with these parts; find other parts with {line}"
-    return f"{_NO_PAIR}: run it without switching, or make other parts rigid"
+        return f"{no_pair} with these parts; find other parts with {line}"
+    return f"{no_pair}: run it without switching, or make other parts rigid"
 
 
 def name_step_after_refusal(
@@ -209,9 +259,8 @@ def name_step_after_refusal(
     missing = situation.together.not_chosen.parts if question.parts else ()
     if missing:
         parts = (*(situation.history.parts or ()), *missing)
-        line = write_command(
-            question, "suggest", new_parts=[str(part.id) for part in parts]
-        )
+        ids = sorted(part.id for part in parts)
+        line = write_command(question, "suggest", new_parts=[*map(str, ids)])
         return f"judge the parts that vibrate together with {line}"
     return otherwise
 
@@ -231,17 +280,25 @@ def name_step_after_card(
     if worst is not None and worst.verdict == DO_NOT_USE:
         return f"choose other times with {write_command(question, 'suggest')}"
     if card.has_engine_files:
-        action, name = "put these files next to the starter deck", "starter deck"
+        action = "save the lines below each '# ---- NAME' as the file NAME next to the starter deck"
+        name = "starter deck"
     else:
         action, name = "add these cards to the main deck", "main deck"
-    hint = "" if deck else f" ({name} instead of {_SOME_DECK})"
+    main_deck = (
+        NamedDeck(deck, "")
+        if deck
+        else name_deck_of_run(question, f"{name} instead of {_SOME_DECK}")
+    )
     if worst is None:
         action = f"these times were not judged, because no history was given; {action}"
-    files = make_positional([deck or _SOME_DECK])
+    files = make_positional([main_deck.name])
     line = quote_shell_line(("d2rpick", "check", *question.checking, *files))
-    if is_separate:
+    if is_separate and not main_deck.hint:
+        again = f"print the card again with --deck {main_deck.name}"
+        action = f"if these parts share nodes, {again}, which merges them; {action}"
+    elif is_separate:
         action = f"if these parts share nodes, print the card again with --merge ID; {action}"
-    return f"{action}, then check it with {line}{hint}"
+    return f"{action}, then check it with {line}{main_deck.hint}"
 
 
 def name_step_after_extract(file: str) -> str:
@@ -249,6 +306,14 @@ def name_step_after_extract(file: str) -> str:
     line = quote_shell_line(("d2rpick", "suggest", *make_positional([file])))
     advice = "print the cards from the run itself, because the table names neither its solver nor all its parts"
     return f"choose times with {line}; {advice}"
+
+
+def name_step_after_weights(file: str) -> str:
+    """Return the next step after weights were written into a file."""
+    words = ("parts", "--deck", _SOME_DECK, "--weights", file, _SOME_HISTORY)
+    line = quote_shell_line(("d2rpick", *words))
+    hint = f"deck and history of your run instead of {_SOME_DECK} and {_SOME_HISTORY}"
+    return f"use the weights, for example with {line} ({hint})"
 
 
 def name_step_after_first(folder: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import list_names, make_printable
@@ -24,16 +25,16 @@ if TYPE_CHECKING:
 
 _EVIDENCE: Final = one_of(*(source for source in SOURCES if source != "given"))
 _FLIGHT: Final = row(
-    Field("start", "number", get=lambda flight: flight[1].start),
+    Field("start", "number", "start of the flight", lambda flight: flight[1].start),
     Field("end", "number?", "end of the flight; null if the record ends in flight",
           lambda flight: flight[1].end if flight[1].end_seen else None),
     Field("parts", maybe(many(keys.PART)), "parts that fly together; null for the whole model",
           lambda flight: flight[1].parts or None),
-    Field("source", _EVIDENCE, get=lambda flight: flight[0]),
+    Field("source", _EVIDENCE, "evidence for the flight", lambda flight: flight[0]),
 )  # fmt: skip
 _TIMES: Final = row(
-    Field("start", "number", get=lambda times: times[0]),
-    Field("end", "number", get=lambda times: times[1]),
+    Field("start", "number", "first time of the interval", lambda times: times[0]),
+    Field("end", "number", "last time of the interval", lambda times: times[1]),
 )
 _FORCE: Final = row(
     Field(
@@ -57,31 +58,35 @@ _PART: Final = row(
 )
 _SAMPLING: Final = row(
     *(
-        Field(key, get_kind("number", exclusiveMinimum=0))
-        for key in ("min", "median", "max")
+        Field(key, get_kind("number", exclusiveMinimum=0), f"{extent} output interval")
+        for key, extent in (
+            ("min", "shortest"),
+            ("median", "median"),
+            ("max", "longest"),
+        )
     )
 )
 DOCUMENT: Final = Document("d2rpick/info/1", "Answer of d2rpick info; times in the unit of the history.", row(
     keys.WARNINGS,
-    Field("source", get_kind("texts", minItems=1)),
+    Field("source", get_kind("texts", minItems=1), "files of the run"),
     Field("format", "text", "format; the formats of companion files are joined by ' + '"),
     Field("version", "text", "version of the solver; empty if no file contains it"),
-    Field("title", "text"),
+    Field("title", "text", "title of the run; empty if no file contains it"),
     Field("states", maybe(get_kind("integer", minimum=0)),
           "number of states; null if the time column is ambiguous. In this case, and for 0 states, the times are "
           "null"),
-    Field("time_start", "number?"), Field("time_end", "number?"),
-    Field("time_unit", "text", "empty if no file contains it"),
+    Field("time_start", "number?", "time of the first state"), Field("time_end", "number?", "time of the last state"),
+    Field("time_unit", "text", "unit of the times; empty if no file contains it"),
     Field("sampling", maybe(_SAMPLING),
           "output intervals; null for a single state"),
     Field("complete", "flag", "false if the file ends within a state"),
-    Field("channels", "texts"),
-    Field("parts", many(_PART)),
+    Field("channels", "texts", "names of the quantities in the files, such as internal_energy"),
+    Field("parts", many(_PART), "parts in the files"),
     Field("flights", many(_FLIGHT), "free flights, found from the best evidence in the files"),
     Field("should_write", "text?",
           "output to request so that the flights of single parts are known; null if the files contain it"),
     keys.HEALTH,
-    Field("notes", "texts"),
+    Field("notes", "texts", "what was left out or assumed when the files were read"),
     Field("verdict", keys.VERDICT, "whether this run is suitable for choosing switch times", later=True),
     Field("verdict_reason", "text", "reason for the verdict, as text", lambda overview: overview.reason, later=True),
     Field("contact_forces", many(_FORCE), "contacts and rigid walls whose forces are in the files", later=True),
@@ -95,6 +100,15 @@ _RECORD: Final = {
     USE_WITH_CARE: "use it with care to choose times",
     DO_NOT_USE: "do not use it to choose times",
 }
+# Advice if momenta are written but show no flight.
+_GIVE_END_OF_LOAD: Final = "if you know that the parts fly after a load, give its end to d2rpick plan with --after"
+# Advice if a load of unknown kind acts in every flight.
+_EXPLAIN_LOAD: Final = (
+    "write the mass and the part momenta (LS-DYNA matsum, Radioss /TH/PART), or give the deck of the run as `deck`, "
+    "because it defines gravity and loads"
+)
+# Statement that no file names the unit of time.
+_UNNAMED: Final = "not named by the files: all values are in the units of the run"
 # Keys of the JSON output whose value is neither a list nor an object.
 _PLAIN = (
     "format",
@@ -136,8 +150,13 @@ def list_overview_lines(overview: Overview) -> list[tuple[str, str]]:
     lines += [("flight", _format_flight(*flight)) for flight in overview.flights]
     if overview.verdict == DO_NOT_USE:
         is_known = overview.unjudged or overview.rigid
-        cure = None if is_known else overview.should_write
-        return [*lines, ("to improve", f"write {cure}")] if cure else lines
+        if is_known:
+            return lines
+        if overview.is_loaded:
+            return [*lines, ("to improve", _EXPLAIN_LOAD)]
+        missing = overview.should_write
+        cure = f"write {missing}" if missing else _GIVE_END_OF_LOAD
+        return [*lines, ("to improve", cure)]
     which = [*_list_selection_options(overview)]
     deck = ["--deck", overview.deck] if overview.deck else []
     command = ["d2rpick", "plan", *which, *deck]
@@ -231,12 +250,12 @@ def list_facts(overview: Overview) -> list[tuple[str, tables.Cell]]:
         ("states", overview.states),
         ("first time", overview.time_start),
         ("last time", overview.time_end),
-        ("time unit", overview.time_unit or None),
+        ("time unit", overview.time_unit or _UNNAMED),
         ("shortest interval", sampling.min if sampling else None),
         ("median interval", sampling.median if sampling else None),
         ("longest interval", sampling.max if sampling else None),
         ("complete", _describe_completeness(overview)),
-        ("channels", ", ".join(overview.channels) or None),
+        ("channels", ", ".join(_list_distinct_channels(overview)) or None),
     ]
     rows += [
         ("contact force", _format_force(force)) for force in overview.contact_forces
@@ -244,6 +263,15 @@ def list_facts(overview: Overview) -> list[tuple[str, tables.Cell]]:
     if overview.should_write:
         rows.append(("should write", overview.should_write))
     return rows
+
+
+def _list_distinct_channels(overview: Overview) -> list[str]:
+    """Return the channels; of those whose names differ only in case and separators, only the first."""
+    channels = {
+        re.sub("[^a-z0-9]+", "_", channel.lower()): channel
+        for channel in reversed(overview.channels)
+    }
+    return [channel for channel in overview.channels if channel in channels.values()]
 
 
 def _describe_completeness(overview: Overview) -> bool | None:

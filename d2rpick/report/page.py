@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from d2rpick.deck.printed_card import PrintedCard, Printing
     from d2rpick.histories.history import History
     from d2rpick.histories.opening import OpenedRun
+    from d2rpick.report.formats import RepeatedQuestion
     from d2rpick.report.keys import Read
 
 # Smallest number of sections of a page with a table of contents.
@@ -313,7 +314,8 @@ class PageContext(NamedTuple):
     ``run`` is the input, ``switched`` a finished switched run.  ``command`` repeats the answer; ``judging`` are the
     options of ``card`` that select the same history.  ``printing`` is how the card of a recommended
     or verified pair is printed; ``card`` is None if there are no parts to switch, or if ``refusal`` says why it cannot
-    be printed.  ``explorer`` makes the page interactive.
+    be printed.  ``explorer`` makes the page interactive.  ``question`` has the words with which the next command asks
+    about the same run.
     """
 
     run: OpenedRun
@@ -324,6 +326,7 @@ class PageContext(NamedTuple):
     refusal: str = ""
     switched: OpenedRun | None = None
     explorer: Explorer | None = None
+    question: RepeatedQuestion | None = None
 
 
 def build_front(cards: Sequence[Markup], *below: Markup) -> Markup:

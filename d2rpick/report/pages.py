@@ -24,7 +24,7 @@ from d2rpick.report.decision import (
     list_verdict_lines,
 )
 from d2rpick.report.explorer import build_explorer, read_scripts, read_styles
-from d2rpick.report.formats import RepeatedQuestion
+from d2rpick.report.formats import DisplayOptions, RepeatedQuestion
 from d2rpick.report.page import (
     Explorer,
     Markup,
@@ -166,14 +166,20 @@ def _build_starred_table(
 
 def suggestion_page(answer: PairSuggestion, record: page.PageContext) -> str:
     """Write the page of ``suggest``."""
+    question = _ask_about_td(record, "--td", f"{answer.td:.6g}")
     first_sections = (
-        _build_choice(answer),
+        _build_choice(answer, steps=suggestion.list_next_step(answer, question)),
         build_explorer(record.explorer),
         _draw_suggestion(answer),
     )
     return _write_run_page(
         record, *first_sections, *_build_lower_sections(answer, record)
     )
+
+
+def _ask_about_td(record: page.PageContext, *times: str) -> RepeatedQuestion:
+    """Return the question of a page with the times of its pair, as typed options."""
+    return (record.question or RepeatedQuestion())._replace(times=times)
 
 
 def _build_lower_sections(
@@ -187,8 +193,10 @@ def _build_lower_sections(
         )
 
 
-def _build_choice(answer: PairSuggestion, title: str = "") -> Markup:
-    """Return the section above the figures, with the pairs of times in large type and remarks."""
+def _build_choice(
+    answer: PairSuggestion, title: str = "", steps: Iterable[tuple[str, str]] = ()
+) -> Markup:
+    """Return the section above the figures, with the pairs of times in large type, the next steps, and remarks."""
     cards = [_build_recommendation(answer, title)]
     better = answer.clearly_better
     if better:
@@ -205,6 +213,7 @@ def _build_choice(answer: PairSuggestion, title: str = "") -> Markup:
         )
     return page.build_front(
         cards,
+        build_pairs(steps),
         build_remarks(answer.cautions),
         build_pairs(suggestion.list_alternatives(answer)),
     )
@@ -265,7 +274,14 @@ def _build_verdict(answer: PairVerdict, record: page.PageContext) -> Iterator[Ma
     further_reasons = [
         reason for reason in answer.reasons if reason not in answer.decision.reason
     ]
-    yield page.build_front([card], build_remarks(answer.cautions, further_reasons))
+    tr, td = times
+    question = _ask_about_td(record, "--tr", f"{tr:.6g}", "--td", f"{td:.6g}")
+    display = DisplayOptions(question=question, page="this page")
+    yield page.build_front(
+        [card],
+        build_pairs(verdict.list_next_step(answer, display)),
+        build_remarks(answer.cautions, further_reasons),
+    )
     yield build_explorer(record.explorer)
     caption = "Internal energy with its level at td, and the pair"
     yield _build_figure("pair-", caption, "verdict", answer, page=True)
@@ -316,14 +332,20 @@ def trade_off_page(answer: TradeOff, record: page.PageContext) -> str:
         f"{len(answer.offers) - len(best)} more td in the csv and json results.",
         class_="soft",
     )
+    steps = trade_off.list_next_step(answer, _ask_about_td(record))
     if answer.requested:
         front = [
-            page.build_front([_build_requested(answer, answer.requested)]),
+            page.build_front(
+                [_build_requested(answer, answer.requested)], build_pairs(steps)
+            ),
             _build_choice(answer.suggestion, "If td is free: "),
         ]
     else:
         lines = build_pairs(trade_off.list_costs_of_other_offers(answer))
-        front = [_build_choice(answer.suggestion), make_element("section", lines)]
+        front = [
+            _build_choice(answer.suggestion, steps=steps),
+            make_element("section", lines),
+        ]
     return _write_run_page(
         record,
         *front,

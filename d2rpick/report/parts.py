@@ -21,7 +21,7 @@ from d2rpick.report.fields import (
     write_csv,
 )
 from d2rpick.report.formats import RepeatedQuestion
-from d2rpick.report.next_step import write_command
+from d2rpick.report.next_step import name_deck_of_run, write_command
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -30,8 +30,6 @@ if TYPE_CHECKING:
     from d2rpick.choice.parts.switchable_parts import PartRow
     from d2rpick.report.formats import DisplayOptions
 
-# Name of a deck in a command if the user has to give it.
-_SOME_DECK: Final = "DECK"
 # Column names of the table of sets, and of the two tables between which the columns for parts are divided.
 SETS = (
     "set",
@@ -99,14 +97,19 @@ _IN_FLIGHT: Final = row(
 PART: Final = row(
     *keys.PART.fields,
     Field("elements", _COUNTS, "numbers of elements by kind; null without a deck"),
-    Field("formulations", "texts"),
-    Field("material", "text?"),
+    Field("formulations", "texts", "element formulations"),
+    Field("material", "text?", "material law; null without a deck"),
     Field(
         "kind",
         maybe(one_of("deformable", "rigid", "spring", "airbag", "void", "particles")),
+        "behaviour of the part, from its elements and material; null without a deck",
     ),
-    Field("mass", "number?"),
-    Field("mass_source", maybe(one_of("history", "deck"))),
+    Field("mass", "number?", "mass; null if unknown"),
+    Field(
+        "mass_source",
+        maybe(one_of("history", "deck")),
+        "source of the mass; null if it is unknown",
+    ),
     *_IN_FLIGHT.of_part(lambda part: part.flight),
     Field(
         "cost_share",
@@ -114,49 +117,81 @@ PART: Final = row(
         "cost of the elements of the part, relative to the cost of all elements",
     ),
     Field("smallest_step", "number?", "smallest stable time step"),
-    Field("step_source", maybe(one_of("deck", "glstat", "d3hsp"))),
+    Field(
+        "step_source",
+        maybe(one_of("deck", "glstat", "d3hsp")),
+        "source of smallest_step; null if it is unknown",
+    ),
     Field(
         "shares_nodes",
         maybe(many("integer")),
         "parts that share nodes with this part; null without a deck",
     ),
-    Field("verdict", one_of("switch", "merge", "keep", "unknown")),
-    Field("merge_with", "integer?"),
-    Field("reasons", "texts"),
+    Field(
+        "verdict",
+        one_of("switch", "merge", "keep", "unknown"),
+        "whether to make the part rigid: yes (switch), yes with the part merge_with (merge), no (keep), or unknown",
+    ),
+    Field(
+        "merge_with",
+        "integer?",
+        "lead part of the rigid body that this part must join; null for other verdicts than merge",
+    ),
+    Field("reasons", "texts", "reasons for the verdict"),
 )
 
 _HISTORY: Final = row(
-    Field("source", "texts", get=lambda run: run.sources),
-    Field("sha256", "texts", get=lambda run: [file.sha256() for file in run.files]),
+    Field("source", "texts", "files of the history", lambda run: run.sources),
+    Field(
+        "sha256",
+        "texts",
+        "SHA-256 of each file",
+        lambda run: [file.sha256() for file in run.files],
+    ),
     Field(
         "format",
         "text",
-        get=lambda run: " + ".join(database.format for database in run.databases),
+        "file format; the formats of companion files are joined by ' + '",
+        lambda run: " + ".join(database.format for database in run.databases),
     ),
-    Field("notes", "texts"),
+    Field("notes", "texts", "what was left out or assumed when the files were read"),
 )
 _DECK: Final = row(
     *keys.FILES,
-    Field("solver", one_of("ls-dyna", "radioss")),
-    Field("parts", "integer", get=lambda deck: len(deck.parts)),
+    Field(
+        "solver", one_of("ls-dyna", "radioss"), "solver for which the deck was written"
+    ),
+    Field("parts", "integer", "number of parts", lambda deck: len(deck.parts)),
     Field(
         "elements",
         "integer",
-        get=lambda deck: sum(sum(counts.values()) for counts in deck.counts.values()),
+        "number of elements",
+        lambda deck: sum(sum(counts.values()) for counts in deck.counts.values()),
     ),
-    Field("complete", "flag"),
-    Field("notes", "texts"),
+    Field("complete", "flag", "false if elements or parts may be missing"),
+    Field("notes", "texts", "cards that d2rpick cannot read, or that switch parts"),
 )
 _WEIGHTS: Final = row(
     *keys.WEIGHTS,
-    Field("element_share", "number"),
-    Field("rigid_node", "number"),
-    Field("per_element", each("number")),
+    Field(
+        "element_share",
+        "number",
+        "fraction of a time step of the deformable model that is spent on elements",
+    ),
+    Field("rigid_node", "number", "cost of a node of a rigid body"),
+    Field("per_element", each("number"), "cost of an element by formulation"),
 )
 _FLIGHT: Final = row(
-    Field("start", "number"), Field("end", "number"), Field("longest", "flag")
+    Field("start", "number", "start of the flight"),
+    Field("end", "number", "end of the flight"),
+    Field("longest", "flag", "true for the longest flight"),
 )
 _MOST_SHOWN = 6
+# Explanation of the position errors, if some sets have none and those of others are unknown.
+_ZERO_BESIDE_UNKNOWN: Final = (
+    "the error is 0 if each rigid body is a single part; it is unknown if a body has several parts, and the files do "
+    "not show how they move relative to each other"
+)
 # Columns that are omitted, in this order, if a terminal is too narrow.
 _SPARE: Final = (
     "material",
@@ -182,35 +217,37 @@ def is_limited_by_no_part(part_set: PartSet) -> bool | None:
 
 
 SET: Final = row(
-    Field("name", "text"),
-    Field("recommended", "flag"),
-    Field("parts", many("integer")),
+    Field("name", "text", "name of the set"),
+    Field("recommended", "flag", "true for the recommended set"),
+    Field("parts", many("integer"), "part numbers of the set"),
     Field("bodies", maybe(many(many("integer"))), "rigid bodies that the parts of the set form; null without a deck",
           lambda part_set: part_set.bodies or None),
     Field("elements", "integer?", "number of elements that are rigid while the set is rigid"),
-    Field("element_fraction", "number?"),
-    Field("mass_fraction", "number?"),
+    Field("element_fraction", "number?", "elements as a fraction of all elements of the deck; null without a deck"),
+    Field("mass_fraction", "number?", "mass as a fraction of the mass of all flying parts; null if a mass is unknown"),
     Field("cost_share", "number?", "saved fraction of the CPU time of a time step while the set is rigid"),
     Field("step_growth", "number?", "smallest factor by which the time step may grow while the set is rigid",
           lambda part_set: None if is_limited_by_no_part(part_set) else part_set.step_growth),
     Field("step_free", "flag?", "true if no deformable element limits the time step while the set is rigid",
           is_limited_by_no_part),
-    Field("tr", "number?", get=lambda part_set: part_set.window and part_set.window[0]),
-    Field("td", "number?", get=lambda part_set: part_set.window and part_set.window[1]),
-    Field("rigid_fraction", "number?"),
-    Field("run_time_share", "number?"),
-    Field("saving", "number?"),
+    Field("tr", "number?", "time at which the set becomes rigid; null if no tr is recommended",
+          lambda part_set: part_set.window and part_set.window[0]),
+    Field("td", "number?", "time at which the set becomes deformable again; null if no tr is recommended",
+          lambda part_set: part_set.window and part_set.window[1]),
+    Field("rigid_fraction", "number?", "rigid time as a fraction of the simulated time"),
+    keys.CANDIDATE.field("run_time_share")._replace(kind="number?"),
+    Field("saving", "number?", "estimated saving of CPU time relative to the reference run"),
     keys.CANDIDATE.field("position_error")._replace(kind="number?"),
-    Field("position_limit", "number?"),
-    Field("position_part", maybe(many(keys.PART)),
-          get=lambda part_set: part_set.position_part and (part_set.position_part,)),
+    Field("position_limit", "number?", "limit of the position error: 1 % of the distance travelled in flight"),
+    Field("position_part", maybe(many(keys.PART)), "part that causes the position error, as a list of one part",
+          lambda part_set: part_set.position_part and (part_set.position_part,)),
     Field("position_body", maybe(many("integer")),
           "parts of the displaced rigid body if there are several bodies; otherwise null",
           lambda part_set: part_set.position_body or None),
     keys.CANDIDATE.field("position_error_assumes")._replace(key="position_assumes"),
     Field("angle_error", "number?",
           "rotation error of the body at td [degrees]; null if unknown"),
-    Field("reasons", "texts"),
+    Field("reasons", "texts", "reasons why values of this set are unknown, and remarks on its position error"),
     keys.CANDIDATE.field("position_error_is_lower_bound")._replace(key="position_is_lower_bound"),
     *(field for field in keys.DECISION if field.key in ("verdict", "verdict_reason", "cure")),
 )  # fmt: skip
@@ -229,20 +266,56 @@ DOCUMENT: Final = Document(
     "Answer of d2rpick parts; times, masses and energies in the units of the history.",
     row(
         keys.WARNINGS,
-        Field("history", _HISTORY, get=lambda answer: answer.files),
-        Field("deck", maybe(_DECK), get=lambda answer: answer.inventory),
-        Field("weights", maybe(_WEIGHTS)),
-        Field("step_ratio", "number", get=lambda answer: answer.settings.step_ratio),
-        Field("flights", many(_FLIGHT), get=_list_flights),
+        Field(
+            "history",
+            _HISTORY,
+            "history that the answer is based on",
+            lambda answer: answer.files,
+        ),
+        Field(
+            "deck",
+            maybe(_DECK),
+            "deck that the answer is based on; null without a deck",
+            lambda answer: answer.inventory,
+        ),
+        Field(
+            "weights",
+            maybe(_WEIGHTS),
+            "element costs that the estimate of the CPU time uses; null without a deck",
+        ),
+        Field(
+            "step_ratio",
+            "number",
+            "time step while the parts are rigid, divided by the time step before (--step-ratio)",
+            lambda answer: answer.settings.step_ratio,
+        ),
+        Field("flights", many(_FLIGHT), "flights of the run", _list_flights),
         Field(
             "parts",
-            many(row(*PART.fields, Field("flights", many(_IN_FLIGHT)))),
-            get=lambda answer: answer.rows,
+            many(
+                row(
+                    *PART.fields,
+                    Field(
+                        "flights",
+                        many(_IN_FLIGHT),
+                        "values of the part in each flight, in the order of flights; the same keys of the part itself "
+                        "refer to the longest flight",
+                    ),
+                )
+            ),
+            "parts of the run or deck",
+            lambda answer: answer.rows,
         ),
-        Field("sets", many(SET)),
+        Field("sets", many(SET), "sets of parts that were compared"),
         Field(
             "recommended",
-            maybe(row(Field("name", "text"), Field("parts", many("integer")))),
+            maybe(
+                row(
+                    Field("name", "text", "name of the set"),
+                    Field("parts", many("integer"), "part numbers of the set"),
+                )
+            ),
+            "recommended set; null if there is none",
         ),
     ),
     closed=True,
@@ -424,8 +497,9 @@ def _name_step_without_set(answer: Parts, question: RepeatedQuestion) -> str:
     # The options name a deck that was not used.
     of_files = RepeatedQuestion(files=question.files)
     if answer.inventory is None:
-        line = write_command(of_files, "parts", "--deck", _SOME_DECK)
-        return f"judge the parts with {line} (main deck of this run instead of {_SOME_DECK})"
+        deck = name_deck_of_run(question)
+        line = write_command(of_files, "parts", "--deck", deck.name)
+        return f"judge the parts with {line}{deck.hint}"
     if not any(row.flight and row.flight.flies is not None for row in answer.rows):
         line = write_command(question, "plan", new_parts=["all"])
         return f"if all parts fly together, plan their switching with {line}"
@@ -479,6 +553,9 @@ def list_page_remarks(answer: Parts) -> list[tuple[str, str]]:
             "to include its gain in the saving, give --step-ratio"
         )
         lines.append(("time step", f"{grows}; {cures}"))
+    errors = [part_set.position_error for part_set in answer.sets]
+    if None in errors and 0.0 in errors:
+        lines.append(("position", _ZERO_BESIDE_UNKNOWN))
     lines += [
         (name_set(part_set), reason)
         for part_set in answer.sets

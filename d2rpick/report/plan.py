@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.base.errors import list_names, make_printable
 from d2rpick.choice.pair.grades import DO_NOT_USE, GOOD, USE, USE_WITH_CARE
+from d2rpick.choice.td.plan import TOO_SHORT
 from d2rpick.report import keys, tables
 from d2rpick.report.decision import (
     format_in_full,
+    format_outlook,
     format_saved_share,
 )
 from d2rpick.report.fields import (
@@ -23,6 +25,7 @@ from d2rpick.report.fields import (
     write_csv,
 )
 from d2rpick.report.next_step import (
+    name_lack_of_pairs,
     name_step_after_refusal,
     name_step_to_card,
     name_step_to_deck,
@@ -84,7 +87,7 @@ WINDOW: Final = row(
         "number of the flight in the record, starting at 1",
         lambda row: row.number,
     ),
-    Field("flight_start", "number", get=lambda row: row.start),
+    Field("flight_start", "number", "start of the flight", lambda row: row.start),
     Field(
         "flight_end",
         "number?",
@@ -103,15 +106,30 @@ WINDOW: Final = row(
         "true if the evidence for the flight excludes contacts and loads",
         lambda row: row.flight.certain,
     ),
-    Field("status", one_of("supported", "re-plan", "done", "left-out")),
+    Field(
+        "status",
+        one_of("supported", "re-plan", "done", "left-out"),
+        "when to use the window: in the next run (supported), in a later run (re-plan), already used (done), or not "
+        "at all (left-out)",
+    ),
     Field(
         "reason",
         "text?",
         "reason why the window is not supported; for a window that is done, what happened after it",
     ),
-    Field("tr", "number?", get=lambda row: _get_time(row, 0)),
-    Field("td", "number?", get=lambda row: _get_time(row, 1)),
-    Field("rigid_time", "number?"),
+    Field(
+        "tr",
+        "number?",
+        "time at which the parts become rigid; null without a window",
+        lambda row: _get_time(row, 0),
+    ),
+    Field(
+        "td",
+        "number?",
+        "time at which the parts become deformable again; null without a window",
+        lambda row: _get_time(row, 1),
+    ),
+    Field("rigid_time", "number?", "td minus tr"),
     Field(
         "rigid_fraction", "number?", "rigid time as a fraction of the simulated time"
     ),
@@ -127,7 +145,8 @@ WINDOW: Final = row(
     Field(
         "basis",
         maybe(keys.BASIS),
-        get=lambda row: (now := _get_situation(row)) and now.basis,
+        "model of the vibration on which the choice is based",
+        lambda row: (now := _get_situation(row)) and now.basis,
     ),
     _BEST.field("kind")._replace(kind=maybe(keys.KIND)),
     *(
@@ -137,7 +156,8 @@ WINDOW: Final = row(
     Field(
         "kinetic_share",
         "number?",
-        get=lambda row: (now := _get_situation(row)) and now.kinetic_share,
+        "kinetic fraction K: fraction of the vibration energy that is kinetic at td",
+        lambda row: (now := _get_situation(row)) and now.kinetic_share,
     ),
     Field(
         "margin",
@@ -218,13 +238,17 @@ def as_table(plan: RunPlan, display: DisplayOptions) -> str:
     if plan.flights:
         known_columns = tables.select_known_columns(*build_flight_table(plan))
         rows = f"\n{tables.as_text(*known_columns, display.width, _SPARE)}\n"
-    below = [*_list_judged_energy(plan), *list_flight_remarks(plan)]
-    if _OUT_OF_PLACE not in rows.strip().partition("\n")[0]:
-        below += _list_position_errors(plan)
+    has_place_column = _OUT_OF_PLACE in rows.strip().partition("\n")[0]
+    further = [] if has_place_column else _list_position_errors(plan)
+    below = [*_list_judged_energy(plan), *list_flight_remarks(plan, further)]
     printable = [(name, make_printable(text)) for name, text in below]
     above = tables.format_in_line([("history", describe_input(plan.history))], 8)
     steps = tables.format_in_line(
-        list_next_steps(plan, display.question, display.written_deck), 4
+        [
+            *list_decisive_reasons(plan),
+            *list_next_steps(plan, display.question, display.written_deck),
+        ],
+        4,
     )
     return "\n".join(
         [
@@ -250,13 +274,15 @@ def give_plan_sentence(plan: RunPlan) -> str:
     if not plan.flights:
         return f"{DO_NOT_USE} any window of this run: no flight is found in the record"
     if not supported:
-        return f"{DO_NOT_USE} any window of this run now; see below"
+        return f"{DO_NOT_USE} any window of this run now"
     spans = " and ".join(
         "from {:.6g} to {:.6g}".format(*window) for window in plan.windows
     )
     use = _describe_use(plan)
-    make = "planned nevertheless (--min-quality): " if use.endswith(DO_NOT_USE) else ""
-    text = f"{use}: {make}make rigid {spans}, {plan.rigid_fraction:.0%} of the simulated time"
+    share = f"{plan.rigid_fraction:.0%} of the simulated time"
+    if _uses_only_poor_windows(plan):
+        return f"{use}: rigid {spans}, {share}, is planned only because of `min_quality` poor"
+    text = f"{use}: make rigid {spans}, {share}"
     if plan.run_time_share is not None:
         text += f"; saves {format_saved_share(plan.run_time_share)}"
     if not waiting:
@@ -290,6 +316,56 @@ def _describe_use(plan: RunPlan) -> str:
     return f"use {len(decisions) - len(poor)} of {open_ones} windows now{which}"
 
 
+def _uses_only_poor_windows(plan: RunPlan) -> bool:
+    """Return True if every window of the plan is one that should not be used, as `min_quality` allows."""
+    decisions = [row.decision for row in plan.supported if row.decision]
+    return bool(decisions) and all(
+        decision.verdict == DO_NOT_USE for decision in decisions
+    )
+
+
+def _list_decided_flights(plan: RunPlan) -> list[PlannedFlight]:
+    """Return the flights on which the first sentence of a plan rests.
+
+    These are the flights with a usable window or, if there is none, those with a window or, failing that, the longest
+    flight that has a pair.
+    """
+    judged = [row for row in plan.flights if row.decision and not row.done]
+    planned = [row for row in judged if row.status == "supported"]
+    usable = [
+        row for row in planned if row.decision and row.decision.verdict != DO_NOT_USE
+    ]
+    refused = [
+        row for row in judged if row.reason and not row.reason.startswith(TOO_SHORT)
+    ]
+    longest = max(refused, key=lambda row: row.end - row.start, default=None)
+    return usable or planned or ([longest] if longest else [])
+
+
+def list_decisive_reasons(plan: RunPlan) -> list[tuple[str, str]]:
+    """Return the reasons for the first sentence of a plan, as (name, sentence) pairs; flights may share a reason."""
+    decided = _list_decided_flights(plan)
+    numbers_by_reason: dict[str, list[int]] = {}
+    for flight in decided:
+        if flight.decision:
+            reason = flight.decision.reason
+            numbers_by_reason.setdefault(reason, []).append(flight.number)
+    if not decided and not plan.done and plan.flights:
+        reasons = {row.reason: row.number for row in plan.flights if row.reason}
+        if all(reason.startswith(TOO_SHORT) for reason in reasons):
+            shortest = f"the shortest window allowed is {plan.min_rigid:.3g}"
+            return [("why", f"every flight is too short; {shortest} (`min_rigid`)")]
+        return [
+            ("why", f"flight {number}: {reason}") for reason, number in reasons.items()
+        ]
+    if len(plan.flights) == 1:
+        return [("why", reason) for reason in numbers_by_reason]
+    return [
+        ("why", f"{_name_flights(numbers)}: {reason}")
+        for reason, numbers in numbers_by_reason.items()
+    ]
+
+
 def _name_flights(numbers: Sequence[int]) -> str:
     plural = "s" if len(numbers) > 1 else ""
     return f"flight{plural} {', '.join(map(str, numbers))}"
@@ -304,7 +380,7 @@ def list_next_steps(
 
     If the deck has already been written with the cards, the next step is to run it.
     """
-    if not plan.windows:
+    if not plan.windows or _uses_only_poor_windows(plan):
         return _list_step_without_window(plan, question)
     waiting = any(row.status == "re-plan" for row in plan.flights)
     cards = name_step_to_card(
@@ -341,7 +417,7 @@ def list_next_steps(
 def _list_step_without_window(
     plan: RunPlan, question: RepeatedQuestion
 ) -> list[tuple[str, str]]:
-    """Return the next command of a plan without a window that can be used now."""
+    """Return the command to type next if no window of a plan can be used now."""
     rows = [row for row in plan.flights if row.answer and not row.done]
     if not rows:
         if plan.done:
@@ -364,7 +440,8 @@ def _list_step_without_window(
 def _name_step_if_flights_are_short(question: RepeatedQuestion) -> str:
     """Return the step if no flight leaves the shortest rigid time: a shorter one or, if it was given, no switching."""
     if "--min-rigid" in question.times:
-        return "no pair of this run can be used: every flight is too short to switch parts in it"
+        no_pair = name_lack_of_pairs(question)
+        return f"{no_pair}: every flight is too short to switch parts in it"
     line = write_command(question, "plan", *question.times, "--min-rigid", "0")
     return f"plan shorter windows too with {line}"
 
@@ -376,6 +453,21 @@ def list_verdicts(plan: RunPlan) -> list[tuple[str, str]]:
     """
     return [
         (f"flight {row.number}", format_in_full(row.decision))
+        for row in plan.flights
+        if row.window and row.decision and _needs_explanation(row.decision)
+    ]
+
+
+def _list_outlooks(plan: RunPlan) -> list[tuple[str, str]]:
+    """Return the verdicts as `list_verdicts` does, but without the reasons that stand in the first lines."""
+    explained = {row.number for row in _list_decided_flights(plan)}
+    return [
+        (
+            f"flight {row.number}",
+            format_outlook(row.decision)
+            if row.number in explained
+            else format_in_full(row.decision),
+        )
         for row in plan.flights
         if row.window and row.decision and _needs_explanation(row.decision)
     ]
@@ -399,6 +491,7 @@ def as_markdown(plan: RunPlan, display: DisplayOptions) -> str:
     """Return the flights as a Markdown table and, below it, the saving and the reasons against windows."""
     below = tables.format_as_list(
         (
+            *list_decisive_reasons(plan),
             *list_next_steps(plan, display.question, display.written_deck),
             *_list_judged_energy(plan),
             *list_flight_remarks(plan),
@@ -413,9 +506,19 @@ def as_markdown(plan: RunPlan, display: DisplayOptions) -> str:
     )
 
 
-def list_flight_remarks(plan: RunPlan) -> list[tuple[str, str]]:
-    """Return the verdicts, remarks and reasons of a plan, in the order of the flights; those of the run come last."""
-    remarks = [*list_verdicts(plan), *list_plan_remarks(plan), *list_reasons(plan)]
+def list_flight_remarks(
+    plan: RunPlan, further: Sequence[tuple[str, str]] = ()
+) -> list[tuple[str, str]]:
+    """Return the outlooks, remarks, reasons and ``further`` texts of a plan, in the order of the flights.
+
+    Those of the whole run come last.
+    """
+    remarks = [
+        *_list_outlooks(plan),
+        *list_plan_remarks(plan),
+        *list_reasons(plan),
+        *further,
+    ]
     numbers = {f"flight {row.number}": row.number for row in plan.flights}
     return sorted(remarks, key=lambda remark: numbers.get(remark[0], len(numbers) + 1))
 
@@ -519,7 +622,12 @@ def _format_place_error(row: PlannedFlight) -> str | None:
 
 
 def _get_verdict(row: PlannedFlight) -> str | None:
-    """Return the verdict on the pair of a flight; None if the pair is usable but the flight has no window."""
+    """Return the verdict on the pair of a flight; None if the pair is usable but the flight has no window.
+
+    A flight that is too short for a window has no other verdict.
+    """
+    if row.reason and row.reason.startswith(TOO_SHORT):
+        return TOO_SHORT
     if row.decision is None:
         return None
     if row.window is None and row.decision.verdict == USE:

@@ -17,19 +17,18 @@ if TYPE_CHECKING:
 
 # Fields of a run in the JSON output, which are also the columns of the table.
 RUN: Final = row(
-    *(
-        Field(key, "number")
-        for key in (
-            "tr",
-            "energy",
-            "energy_ratio",
-            "roll_error",
-            "x_error",
-            "z_error",
-            "omega_error",
-            "lost_energy",
-            "mean_ratio",
-        )
+    keys.TR,
+    Field("energy", "number", "internal energy of the box at tr"),
+    Field("energy_ratio", "number", "energy divided by energy_td"),
+    Field("roll_error", "number", "error of the roll angle at td"),
+    Field("x_error", "number", "horizontal position error of the centre of mass at td"),
+    Field("z_error", "number", "vertical position error of the centre of mass at td"),
+    Field("omega_error", "number", "error of the roll rate at td"),
+    Field("lost_energy", "number", "kinetic energy of the vibration at tr"),
+    Field(
+        "mean_ratio",
+        "number",
+        "mean energy of the box from td to the landing, divided by the mean in the reference run",
     ),
     closed=True,
 )
@@ -50,13 +49,12 @@ DOCUMENT: Final = Document(
             "time of the first ground force; null if the run ends earlier",
             lambda scan: scan.reference.landed,
         ),
-        Field("td", "number", get=lambda scan: scan.answer.situation.td),
+        keys.TD._replace(get=lambda scan: scan.answer.situation.td),
         Field(
             "energy_td",
             "number",
-            get=lambda scan: _interpolate_energy(
-                scan.reference, scan.answer.situation.td
-            ),
+            "internal energy of the box at td in the reference run",
+            lambda scan: _interpolate_energy(scan.reference, scan.answer.situation.td),
         ),
         Field(
             "recommended",
@@ -64,7 +62,12 @@ DOCUMENT: Final = Document(
             "tr that suggest recommends",
             lambda scan: _get_recommended_tr(scan.answer),
         ),
-        Field("runs", many(RUN), get=lambda scan: scan.outcomes),
+        Field(
+            "runs",
+            many(RUN),
+            "switched runs, compared with the reference run",
+            lambda scan: scan.outcomes,
+        ),
         title="d2rpick rollover --scan",
     ),
 )

@@ -22,8 +22,8 @@ _NAMED = 5
 
 
 def describe_input(history: History) -> str:
-    """Return files, format, energy and time span of a history."""
-    unit = f" {history.time_unit}" if history.time_unit else ""
+    """Return files, format, energy and time span of a history; without a time unit, say that it is that of the run."""
+    unit = f" {history.time_unit}" if history.time_unit else " (units of the run)"
     description = (
         f"{', '.join(history.source)}: {history.format}, {name_energy(history)}"
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, Final
@@ -55,21 +56,24 @@ _JUDGED: Final[dict[str, Any]] = {
     "else": {"properties": {"tr": _NULL, "message": {"type": "string"}}},
 }
 PLAIN: Final = row(
-    Field("source", "text"),
-    Field("tr", "number?"), Field("tr_low", "number?"), Field("tr_high", "number?"),
-    Field("energy_td", "number?"),
-    Field("residual", "number?"),
-    Field("status", STATUS),
-    Field("message", "text?"),
-    Field("basis", maybe(keys.BASIS)),
-    Field("warnings", "texts"),
-    Field("time_unit", "text"),
+    Field("source", "text", "run, as given"),
+    Field("tr", "number?", "tr recommended for this run"),
+    keys.CANDIDATE.field("tr_low"),
+    keys.CANDIDATE.field("tr_high"),
+    Field("energy_td", "number?", "internal energy at td"),
+    Field("residual", "number?", "residual R of the pair of this run; null if unknown"),
+    Field("status", STATUS, "ok if a tr is recommended, otherwise why there is none"),
+    Field("message", "text?", "reason why no tr is recommended; null if status is ok"),
+    Field("basis", maybe(keys.BASIS), "model of the vibration on which the choice is based"),
+    Field("warnings", "texts", "warnings about this run"),
+    Field("time_unit", "text", "unit of the times; empty if no file contains it"),
     Field("td", "number?", "td of this run"),
     Field("record_end", "number?", "last time of the record"),
     Field("quality", keys.GRADE, "grade of the pair; null if there is no pair", later=True),
     Field("verdict", maybe(keys.VERDICT), "what to do with the pair of this run", later=True),
     Field("verdict_reason", "text?", "reason for the verdict, as text", later=True),
     Field("cure", "text?", "how to improve the pair; empty for a good pair", later=True),
+    Field("better_td", "number?", "td of a better pair; null if none is known", later=True),
     Field("energy_unit", "text", "unit of the energies; empty if no file contains it", later=True),
 )  # fmt: skip
 _ERROR: Final = Field(
@@ -85,13 +89,15 @@ RUN: Final = row(
 _RUN: Final = row(
     *RUN.fields, name="run", later=("common_error", "record_end"), **_JUDGED
 )
+# Keys of the statistics of tr, with the words for them.
+_EXTENTS: Final = {"min": "smallest", "median": "median", "max": "largest"}
 _SHARED: Final = row(
     keys.WARNINGS,
     Field("td", "number?", "given td; null if each run has its own td"),
     Field("td_window", "span?", "range in which each run chose its td"),
-    Field("tr", row(*(Field(key, "number?") for key in ("min", "median", "max"))),
+    Field("tr", row(*(Field(key, "number?", f"{extent} tr") for key, extent in _EXTENTS.items())),
           "statistics of tr, for the runs that have a tr",
-          lambda answer: answer.spread or dict.fromkeys(("min", "median", "max"))),
+          lambda answer: answer.spread or dict.fromkeys(_EXTENTS)),
     Field("agree", "flag?", "true if the intervals from tr_low to tr_high of these runs overlap"),
     Field("common_tr", "number?",
           "median of tr, or the time nearest to it within all intervals, if the runs agree. Otherwise the earliest tr "
@@ -112,7 +118,8 @@ _SHARED: Final = row(
                                             "common_tr",
           lambda answer: answer.common.errors),
 )  # fmt: skip
-_RUNS: Final = Field("runs", many(RUN), get=lambda answer: list(add_errors(answer)))
+_RUNS: Final = Field("runs", many(RUN), "one entry for each run, in the order of the arguments",
+                     lambda answer: list(add_errors(answer)))  # fmt: skip
 _MEANING: Final = (
     "Answer of d2rpick study; times in the unit of the histories. With -f ndjson each run is a line that follows "
     "$defs/line; the last line follows $defs/last."
@@ -130,6 +137,10 @@ _LINE: Final = row(
     name="line", later=("common_error", "curve", "record_end"), **_JUDGED,
 )  # fmt: skip
 _MOST_REASONS: Final = 3
+# Numbers in a reason; reasons that differ only in them are shown once.
+_NUMBER: Final = r"\d+(?:\.\d+)?(?:e[+-]?\d+)?"
+# Runs share a better td if their better td differ by at most this fraction [-].
+_SAME_TD: Final = 1e-3
 # Columns that are omitted, in this order, if a terminal is too narrow; the energy at td is omitted before them.
 _SPARE: Final = (
     "+-",
@@ -243,7 +254,7 @@ def build_run_table(answer: StudyOfRuns) -> tuple[list[str], list[list[tables.Ce
 
 
 def _explain_status(row: StudyRow) -> str:
-    """Return the message of a run without the name of the run or, failing that, the codes of its warnings, if any."""
+    """Return the message of a run, without the name of the run. If it has none, return the codes of its warnings."""
     text = row.message or ", ".join(row.warnings)
     return text.removeprefix(f"{row.source.rstrip('/')}: ")
 
@@ -340,18 +351,27 @@ def list_run_reasons(answer: StudyOfRuns) -> list[tuple[str, str]]:
 
     The reasons for "use" are among them if the vibration error is large, but small beside the next contact.
     """
-    causes = Counter(
-        (row.verdict, row.verdict_reason, row.cure)
-        for row in answer.runs
-        if row.verdict and (row.cure or _has_large_error(row))
-    )
-    return [
-        (
-            "why",
-            f"{verdict} in {format_number_of_runs(count)}: {reason}{f'. To improve: {cure}' if cure else ''}",
-        )
-        for (verdict, reason, cure), count in causes.most_common(_MOST_REASONS)
-    ]
+    rows_by_cause: dict[tuple[str | None, str], list[StudyRow]] = {}
+    for run in answer.runs:
+        if run.verdict and (run.cure or _has_large_error(run)):
+            without_numbers = re.sub(_NUMBER, "#", _describe_cause(run))
+            rows_by_cause.setdefault((run.verdict, without_numbers), []).append(run)
+    groups = sorted(rows_by_cause.values(), key=len, reverse=True)
+    return [("why", _describe_shared_cause(rows)) for rows in groups[:_MOST_REASONS]]
+
+
+def _describe_shared_cause(rows: Sequence[StudyRow]) -> str:
+    """Return the verdict, reason and cure that runs share; if their numbers differ, with those of the first run."""
+    causes = {_describe_cause(row) for row in rows}
+    example = f" (numbers of {rows[0].source})" if len(causes) > 1 else ""
+    runs = format_number_of_runs(len(rows))
+    return f"{rows[0].verdict} in {runs}: {_describe_cause(rows[0])}{example}"
+
+
+def _describe_cause(row: StudyRow) -> str:
+    """Return why the pair of a run is not better, and how to improve it."""
+    cure = f". To improve: {row.cure}" if row.cure else ""
+    return f"{row.verdict_reason}{cure}"
 
 
 def _has_large_error(row: StudyRow) -> bool:
@@ -372,7 +392,13 @@ def list_next_step(
         return [("next", f"look at the first run with {write_command(first, 'info')}")]
     worst = min(judged, key=lambda row: GRADES.index(row.quality or POOR))
     of_worst = question._replace(files=(worst.source,))
-    if worst.quality == POOR:
+    better_td = _find_shared_better_td(answer)
+    if worst.quality == POOR and better_td is not None:
+        readable = tuple(row.source for row in answer.runs if row.judged)
+        of_readable = question._replace(files=readable)
+        line = write_command(of_readable, "study", "--td", f"{better_td:.6g}")
+        step = f"judge all runs at the better td with {line}"
+    elif worst.quality == POOR:
         line = write_command(of_worst, "suggest", *question.times)
         step = f"look at the first of the worst runs with {line}"
     elif len(judged) == 1:
@@ -392,6 +418,17 @@ def list_next_step(
         line = write_command(of_worst, "verify", *times)
         step = f"judge the common pair in the worst run with {line}"
     return [("next", step)]
+
+
+def _find_shared_better_td(answer: StudyOfRuns) -> float | None:
+    """Return the better td that all runs with a given td share [time]; None if one has no other or a different td."""
+    poor = [row for row in answer.runs if row.quality == POOR]
+    found = [row.better_td for row in poor if row.better_td is not None]
+    if answer.td is None or len(poor) < 2 or len(found) < len(poor):
+        return None
+    is_shared = max(found) - min(found) <= _SAME_TD * max(found)
+    is_other = abs(found[0] - answer.td) > _SAME_TD * answer.td
+    return found[0] if is_shared and is_other else None
 
 
 def describe_td(answer: StudyOfRuns) -> str:

@@ -43,20 +43,17 @@ _WINDOW: Final = row(
 # Fields of a pair and of the decision on it.
 _JUDGED_PAIR: Final = row(
     *keys.PAIR.fields,
-    Field("verdict", keys.VERDICT),
-    Field("verdict_reason", "text"),
-    later=("verdict", "verdict_reason"),
+    Field("verdict", keys.VERDICT, "what to do with this pair"),
+    Field("verdict_reason", "text", "reason for the verdict, as text"),
 )
 # Fields of a candidate and of the decision on it.
 CANDIDATE: Final = row(
     *keys.CANDIDATE.of_part(lambda candidate_and_decision: candidate_and_decision[0]),
-    keys.NO_PARTS,
     *keys.DECIDED.of_part(
         lambda candidate_and_decision: candidate_and_decision[1],
         ("verdict", "verdict_reason", "cure"),
     ),
     name="candidate",
-    later=(*keys.LATER, "parts", "verdict", "verdict_reason", "cure"),
 )
 
 # _SPARE: columns that are omitted first if the table of candidates is too wide.
@@ -93,27 +90,25 @@ def _judge_pair_at_better_td(answer: PairSuggestion) -> dict[str, Any] | None:
     return {**pair, "verdict": decision.verdict, "verdict_reason": decision.reason}
 
 
-DOCUMENT: Final = Document("d2rpick/suggest/1", "Answer of d2rpick suggest; times in the unit of the history.", row(
+DOCUMENT: Final = Document("d2rpick/suggest/2", "Answer of d2rpick suggest; times in the unit of the history.", row(
     *keys.FRAME,
-    Field("td", "number"),
+    keys.TD,
     Field("td_window", "span?",
           "range in which td was chosen: --td-window, or the longest flight; null if td was given"),
     Field("longer_pair", maybe(keys.PAIR),
           "longest admissible pair in td_window, if it is much longer than the recommended pair but of lower quality",
           lambda answer: answer.longer),
     *keys.MECHANICS.of_part(lambda answer: answer.situation),
-    Field("candidates", many(CANDIDATE), get=_add_decisions),
+    Field("candidates", many(CANDIDATE), "values of tr for this td, from best to worst", _add_decisions),
     Field("acceptable_windows", maybe(many(_WINDOW)),
           "admissible tr ranges, if the basis is energy; otherwise null", _list_acceptable_windows),
-    Field("recommended", maybe(keys.TIMES)),
+    Field("recommended", maybe(keys.TIMES), "recommended pair; null if there is none"),
     *keys.QUALITY,
     keys.HEALTH,
     keys.EXPECTED,
     Field("better_td", maybe(_JUDGED_PAIR), "pair at a better td; null if there is none, or if it is the recommended "
                                             "pair",
           _judge_pair_at_better_td),
-    later=("health", "kinetic_share_estimated", "modes", "unsigned_parts", "td_window", "expected", "quality",
-           "quality_reasons"),
 ))  # fmt: skip
 
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 Cell = str | float | int | bool | None
 Rows = "Iterable[Sequence[Cell]]"
 # _WORD: in a table that is too wide, words longer than this number of characters (e.g. paths) are split first.
-# _LEAST: in a table that is still too wide, words longer than this are split; numbers are shorter.
+# _LEAST: in a table that is still too wide, words of more characters than this are split. All numbers are shorter.
 _WORD: Final = 32
 _LEAST: Final = 12
 # _NUMBER: pattern of a number, which is not treated as a spreadsheet formula.

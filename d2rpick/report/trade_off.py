@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from d2rpick.report.formats import DisplayOptions, RepeatedQuestion
 
 OFFER: Final = row(
-    Field("td", "number"),
+    keys.TD,
     Field("peak", "flag", "true if the energy has a peak at td"),
     Field("tr", "number?", "tr that suggest recommends for td; null if there is none"),
     Field("error", "size?",
@@ -39,9 +39,7 @@ OFFER: Final = row(
           "a longer rigid time with at most the same error"),
     Field("recommended", "flag", "true for the pair that suggest recommends if td is not given"),
     *keys.QUALITY,
-    Field("basis", keys.BASIS),
-    Field("energy_td", "number"),
-    Field("kinetic_share", maybe(keys.SHARE)),
+    *(keys.MECHANICS.field(key) for key in ("basis", "energy_td", "kinetic_share")),
     *(field._replace(kind=maybe(field.kind)) for field in keys.CANDIDATE.of_part(
         lambda offer: offer.best, ("kind", *keys.MEASURES, "tr_low", "tr_high", "same_swing"))),
     Field("reason", "text?", "reason why no tr is recommended", lambda offer: offer.answer.why_none or None),
@@ -70,9 +68,9 @@ _SPARE: Final = (
     "kinetic fraction",
 )
 
-_NONE_ADMISSIBLE: Final = "No td in the range has an admissible tr."
-_NONE_BETTER: Final = "No other td in the range is better."
-_NOT_HALVED: Final = "No other td in the range halves this error without giving up more than half of the rigid time."
+_NONE_ADMISSIBLE: Final = "no td in the range has an admissible tr"
+_NONE_BETTER: Final = "no other td in the range is better"
+_NOT_HALVED: Final = "no other td in the range halves this error without giving up more than half of the rigid time"
 
 
 def as_table(trade_off: TradeOff, display: DisplayOptions) -> str:
@@ -267,8 +265,7 @@ def give_answer(trade_off: TradeOff) -> str:
         quality_text = f"td = {requested.td:.6g} has no admissible tr"
     else:
         quality_text = f"td = {requested.td:.6g}: {_format_offer_error(requested)}"
-    separator = ". " if trade_off.step is None else "; "
-    return f"{quality_text}{separator}{_describe_step(trade_off, requested)}"
+    return f"{quality_text}; {_describe_step(trade_off, requested)}"
 
 
 def _describe_step(trade_off: TradeOff, requested: Offer) -> str:
@@ -289,14 +286,14 @@ def _describe_step(trade_off: TradeOff, requested: Offer) -> str:
     return f"{distance} {error_change} and {cost_change}"
 
 
-DOCUMENT: Final = Document("d2rpick/explore/1", "Answer of d2rpick explore; times in the unit of the history.", row(
+DOCUMENT: Final = Document("d2rpick/explore/2", "Answer of d2rpick explore; times in the unit of the history.", row(
     *keys.FRAME,
     Field("td", "number?", "given td", lambda trade_off: trade_off.requested and trade_off.requested.td),
     Field("td_window", "span",
           "range in which td was explored: the given range, or the longest flight up to the margin before the contact"),
     *keys.MECHANICS.of_part(lambda trade_off: trade_off.situation, ("flight", "oscillator", "modes")),
     Field("answer", "text", "summary of the answer in one sentence", give_answer),
-    Field("recommended", maybe(keys.TIMES)),
+    Field("recommended", maybe(keys.TIMES), "recommended pair; null if there is none"),
     Field("start", "number?",
           "td with which the others are compared: the given td, otherwise the td with the largest saving",
           lambda trade_off: trade_off.start and trade_off.start.td),
@@ -353,7 +350,7 @@ def _describe_cost_change(start: Offer, step: Offer) -> str:
 
 
 def _format_offer_error(offer: Offer) -> str:
-    """Return the error of a proposed pair with its name."""
+    """Return the name and the value of the error of a proposed pair, such as "residual 0.02"."""
     if offer.error is None:
         return "an energy above twice its mean"
     if offer.basis == "energy":

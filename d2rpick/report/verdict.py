@@ -30,11 +30,15 @@ if TYPE_CHECKING:
 
 # Fields of the judged pair, of its measured values, and of the verdict on it.
 MEASURES: Final = row(
-    Field("tr", "number", get=lambda answer: answer.candidate.tr),
-    Field("td", "number", get=lambda answer: answer.situation.td),
+    keys.TR._replace(get=lambda answer: answer.candidate.tr),
+    keys.TD._replace(get=lambda answer: answer.situation.td),
     *keys.CANDIDATE.of_part(lambda answer: answer.candidate, keys.MEASURES),
-    Field("tr_ok", "flag?"),
-    Field("td_ok", "flag?"),
+    Field("tr_ok", "flag?", "true if tr is admissible; null if the flight is unknown"),
+    Field(
+        "td_ok",
+        "flag?",
+        "true if td lies in the flight, and the kinetic fraction K is small enough; null if K is unknown",
+    ),
     Field(
         "verified",
         "flag",
@@ -42,34 +46,36 @@ MEASURES: Final = row(
     ),
 )
 SWITCHED: Final = row(
-    Field("source", get_kind("texts", minItems=1)),
+    Field("source", get_kind("texts", minItems=1), "files of the switched run"),
     Field("energy_frozen", "number", "energy of the switched run at td"),
     Field("energy_td", "number", "energy of the reference run at td"),
     Field("level_ratio", "number?", "energy_frozen divided by energy_td"),
     Field("end", "number", "end of the comparison, which begins at td"),
-    Field("mean_after", "number"), Field("mean_after_reference", "number"),
+    Field("mean_after", "number", "mean energy after td in the switched run"),
+    Field("mean_after_reference", "number", "mean energy after td in the reference run"),
     Field("spread_after", get_kind("number", minimum=0), "standard deviation of the energy after td in the switched "
                                                          "run"),
-    Field("spread_after_reference", get_kind("number", minimum=0)),
+    Field("spread_after_reference", get_kind("number", minimum=0), "standard deviation of the energy after td in the "
+                                                                   "reference run"),
     Field("momentum_error", "size?",
           "largest deviation of the momentum after td, relative to the largest momentum of the reference run after td"),
     Field("displacement", "size?", "largest distance between the centres of the parts in the two runs after td"),
-    Field("rigid_from", "number?"), Field("rigid_to", "number?"), Field("objections", "texts"),
-    Field("notes", "texts"),
+    Field("rigid_from", "number?", "first time at which the energy of the switched run is constant in the window; null "
+                                   "if it is not constant"),
+    Field("rigid_to", "number?", "last time at which this energy is constant"),
+    Field("objections", "texts", "reasons why the comparison failed; empty if it passed"),
+    Field("notes", "texts", "what was left out or assumed when the switched run was read, and anomalies of this run"),
     name="switched", later=("rigid_from", "rigid_to", "objections"),
 )  # fmt: skip
-DOCUMENT: Final = Document("d2rpick/verify/1", "Answer of d2rpick verify; times in the unit of the history.", row(
+DOCUMENT: Final = Document("d2rpick/verify/2", "Answer of d2rpick verify; times in the unit of the history.", row(
     *keys.FRAME,
     *keys.MECHANICS.of_part(lambda answer: answer.situation),
     *MEASURES.fields,
     *keys.QUALITY,
-    keys.NO_PARTS,
     keys.HEALTH,
-    Field("reasons", "texts"),
+    Field("reasons", "texts", "reasons for the verdict, and remarks"),
     Field("switched", maybe(SWITCHED), "comparison of a finished switched run with the reference run; null without "
                                        "--switched"),
-    later=("kinetic_share_estimated", "modes", "unsigned_parts", "health", "quality", "quality_reasons", "parts",
-           *keys.LATER),
 ))  # fmt: skip
 COMPARED = ("", "switched", "reference")
 
@@ -135,7 +141,7 @@ def list_next_step(
 
 
 def list_comparison_verdict(switched: Comparison) -> tuple[str, str]:
-    """Return a name, and a text that states whether the switched run agrees with the reference run within limits."""
+    """Return a row: its name, and whether the switched run agrees with the reference run within the limits."""
     compared = []
     if switched.mean_after_reference > 0:
         ratio = switched.mean_after / switched.mean_after_reference

@@ -133,11 +133,11 @@ EXPLANATIONS_BY_TOPIC: Final = {
     },
     "The record": {
         "coarse-record": Explanation(
-            "The fastest line of the energy, even a weak one, has fewer than 4 states per period. The verdict is "
-            "based on the strong lines. The record may hide a faster vibration, and the error after td may then be "
+            "The fastest spectral line of the energy, even a weak one, has fewer than 4 states per period. The verdict "
+            "is based on the strong lines. The record may hide a faster vibration, and the error after td may then be "
             "larger than stated.",
-            "Write the energies more often: at least ten states per period of the fastest line of the energy, which is "
-            "half a period of the vibration.",
+            "Write the energies more often: at least ten states per period of the fastest line of the energy. This "
+            "period is half a period of the vibration.",
         ),
         "engine-wrong-energy": Explanation(
             "The listing shows a version of OpenRadioss before January 2026. This version writes wrong internal "

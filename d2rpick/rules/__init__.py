@@ -1,6 +1,6 @@
 """Rules of ``check``: the table of all rules, the configuration that selects rules, and the check of one deck.
 
-They are configured by ``d2rpick.toml`` or ``[tool.d2rpick]`` of pyproject.toml; the nearest file is used.
+Rules are configured in ``d2rpick.toml`` or in ``[tool.d2rpick]`` of pyproject.toml; the nearest file is used.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ def find_rules(name: str) -> tuple[Rule, ...]:
     Raises
     ------
     ConfigurationError
-        If there is none; the message names the nearest id.
+        If there is no such rule; the message names the nearest id.
 
     Examples
     --------
@@ -145,7 +145,8 @@ def read_configuration(
 ) -> Configuration:
     """Return the configuration defined in a table of settings.
 
-    ``other_keys`` are keys that belong to other commands; so do nested tables, one for each command.
+    ``other_keys`` are keys that belong to other commands; nested tables belong to the command that they are named
+    after.
 
     Raises
     ------
@@ -193,8 +194,8 @@ def _read_rule_names(
 class CheckedWindow(NamedTuple):
     """A rigid window; ``place`` is the card that opens it. A window does not keep the deck in memory.
 
-    ``cards`` are the numbers of the cards that open and close it; the second one is None if no card closes it.
-    ``decision`` is the verdict on its pair of times; None if no history judges the pair.
+    ``cards`` contains the numbers of the cards that open and close the window; the second one is None if no card closes
+    it. ``decision`` is the verdict on its pair of times; None if no history judges the pair.
     """
 
     unit: Unit
@@ -238,7 +239,7 @@ def find_configuration(
     Raises
     ------
     ConfigurationError
-        If it cannot be read, or names a rule that does not exist.
+        If the configuration cannot be read, or names a rule that does not exist.
     """
     nearest = find_nearest_settings(os.path.dirname(deck))  # noqa: PTH120  a name with a NUL byte has no folder
     nearest_configuration = read_configuration(
@@ -266,18 +267,19 @@ def check_deck(
     path : str
         The main deck; or a file of a Radioss run, which is checked with the others of that run.
     configuration : Configuration, optional
-        Selected rules and their severities; default: all rules as they are.
+        Selected rules and their severities; the default is all rules with their default severities.
     judge : HistoryJudge, optional
-        Judges the windows by an energy history; if there is no history, the energy rules find nothing.
+        Judges the windows by an energy history; if it is None, the energy rules find nothing.
     content : bytes, optional
         Content of the deck, if it is not a file.
     restarts : sequence of str, optional
-        Small restart decks of LS-DYNA that continue the run: their cards switch when the restart begins.
+        Small restart decks of LS-DYNA that continue the run; their cards switch when the restart begins.
 
     Returns
     -------
     Checked
-        Windows by part and time, findings by file and line; findings silenced by a comment are left out.
+        Windows sorted by part and time, and findings sorted by file and line; findings silenced by a comment are
+        omitted.
 
     Raises
     ------

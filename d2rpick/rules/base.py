@@ -274,7 +274,7 @@ class Case:
 
     @property
     def whole(self) -> bool:
-        """Return True if all parts are known, unlike in a file of switching cards that another deck includes."""
+        """Return True if all parts are known; a file of switching cards that another deck includes knows none."""
         return self.parts.all_known and bool(self.parts.materials)
 
     @cached_property

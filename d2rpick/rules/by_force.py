@@ -1,7 +1,7 @@
-"""Evaluate switches by a contact or rigid-wall force with a history that shows when this force acts.
+"""Evaluate switches triggered by a contact or rigid-wall force, with a history that shows when this force acts.
 
-Forces that the solver wrote show when each contact and wall acts.  Momenta show that a force acts on a part, not which
-contact exerts it: with momenta alone a deck with several contacts and walls is not judged.
+Forces that the solver wrote show when each contact and wall acts. Momenta show that a force acts on a part, but not
+which contact exerts it, so decks with several contacts or walls are not judged by momenta.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from d2rpick.deck.switching import SwitchEvent, SwitchSet, SwitchWindow
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
+    from d2rpick.base.spans import Spans
     from d2rpick.deck.card import Card
     from d2rpick.deck.reader import Deck
     from d2rpick.deck.switching import SwitchHeader, Unit
     from d2rpick.rules.judgement import HistoryJudge
 
-    Spans = tuple[tuple[float, float], ...]  # Start and end of each time span [time].
 
 # For each CODE: what exerts the force, and True if the set waits until the force begins, False if it ends.
 _CODES: Final = {
@@ -140,8 +140,8 @@ def _see_contacts(
 ) -> _Seen | None:
     """Return the contact spans for a set from written forces or, if the deck has only one contact, from part momenta.
 
-    For a set with OFFSET a contact begins earlier, by the time to fly this distance.  None if the history does not show
-    the contacts, and for a contact whose force triggers no switch (D2R008).
+    For a set with OFFSET, each contact begins earlier by the time in which the parts fly this distance. The result is
+    None if the history does not show the contacts, or if the force of the contact triggers no switch (D2R008).
     """
     header = card.header
     if header is None or not _can_trigger(deck, header):
@@ -178,8 +178,8 @@ def find_spans_of_force(
 ) -> Spans | None:
     """Return the time spans in which the written force of a contact or rigid wall exceeds ``least`` [force] [time].
 
-    Files name a contact by its id, or by its order if it has none.  Some name rigid walls by their order in any case:
-    if there are several and their ids differ from their order, none is used.
+    Files identify a contact by its id or, if it has none, by its position in the order of definition. Some files always
+    identify rigid walls by position; if there are several walls whose ids differ from their positions, no wall is used.
     """
     entities = read_entities(deck, _KEYWORDS[kind])
     entity = entities.named(number)

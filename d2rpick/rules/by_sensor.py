@@ -11,11 +11,10 @@ from d2rpick.rules.by_force import find_spans_of_force
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
+    from d2rpick.base.spans import Spans
     from d2rpick.deck.reader import Deck
     from d2rpick.deck.switching import SwitchHeader
     from d2rpick.rules.judgement import HistoryJudge
-
-    Spans = tuple[tuple[float, float], ...]  # Start and end of each time span [time].
 
 
 class Sensed(NamedTuple):

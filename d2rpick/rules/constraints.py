@@ -5,7 +5,7 @@ part is rigid. Two flags of the cards do this, for all constraints of a kind.  P
 connects separate unless they are one rigid body.
 
 Source: vendor keyword data for NRBF (nodal rigid bodies, generalized welds), NCSF (nodal constraints, spotwelds) and
-LRB; the vendor's public modelling rules for rigid bodies, which except joints between rigid bodies.
+LRB; the vendor's public modelling rules for rigid bodies, which permit joints between rigid bodies.
 """
 
 from __future__ import annotations
@@ -125,8 +125,9 @@ def _find_flags(case: Case, card: SwitchSet) -> _Flags | None:
 class _Joining(NamedTuple):
     """A constraint and the parts that it joins.
 
-    ``deformable`` are those of the ``parts`` that no card makes rigid. ``body_count`` is the number of rigid bodies to
-    which the other parts belong. ``flags`` are those of the cards that make parts rigid, keyed by part id.
+    ``deformable`` contains those of the ``parts`` that no card makes rigid. ``body_count`` is the number of rigid
+    bodies to which the other parts belong. ``flags`` contains NRBF and NCSF of the cards that make parts rigid, keyed
+    by part id.
     """
 
     constraint: Constraint
@@ -245,13 +246,17 @@ def _find_separating(case: Case, kinds: Sequence[Kind]) -> Iterator[Objection]:
 
 
 @set_passing(
-    PASS,
-    _make_constrained_deck(_BODY, "         1         0"),
-    _make_constrained_deck(_BODY.replace("   5\n", "   6\n")),
+    lambda: [
+        PASS,
+        _make_constrained_deck(_BODY, "         1         0"),
+        _make_constrained_deck(_BODY.replace("   5\n", "   6\n")),
+    ]
 )
 @set_failing(
-    _make_constrained_deck(_BODY),
-    _make_constrained_deck(_BODY, "         2         1"),
+    lambda: [
+        _make_constrained_deck(_BODY),
+        _make_constrained_deck(_BODY, "         2         1"),
+    ]
 )
 @make_rule_decorator(
     "D2R112", ERROR, "a nodal rigid body on a switched part stays active (NRBF)"
@@ -268,14 +273,18 @@ def _check_nodal_bodies(case: Case) -> Iterator[Objection]:
 
 
 @set_passing(
-    PASS,
-    _make_joined_deck(
-        _JOINING_BODY, "         1         0", "1", "         2         1      PART"
-    ),
+    lambda: [
+        PASS,
+        _make_joined_deck(
+            _JOINING_BODY, "         1         0", "1", "         2         1      PART"
+        ),
+    ]
 )
 @set_failing(
-    _make_joined_deck(_JOINING_BODY, "         1         0", "1", "2"),
-    _make_joined_deck(_JOINING_BODY, "         1         0", "1"),
+    lambda: [
+        _make_joined_deck(_JOINING_BODY, "         1         0", "1", "2"),
+        _make_joined_deck(_JOINING_BODY, "         1         0", "1"),
+    ]
 )
 @make_rule_decorator(
     "D2R120", ERROR, "a deleted nodal rigid body (NRBF 1) that joins separate bodies"
@@ -291,16 +300,20 @@ def _check_separated_parts(case: Case) -> Iterator[Objection]:
 
 
 @set_passing(
-    PASS,
-    _make_constrained_deck(_EXTRA, "         0         1"),
-    _make_constrained_deck(_JOINT, "         1         0"),
-    _make_constrained_deck(_SPOTWELD, "         0         1"),
+    lambda: [
+        PASS,
+        _make_constrained_deck(_EXTRA, "         0         1"),
+        _make_constrained_deck(_JOINT, "         1         0"),
+        _make_constrained_deck(_SPOTWELD, "         0         1"),
+    ]
 )
 @set_failing(
-    _make_constrained_deck(_EXTRA),
-    _make_constrained_deck(_JOINT),
-    _make_constrained_deck(_EXTRA.replace("  8  ", "  1  ")),
-    _make_constrained_deck(_SPOTWELD, "         1         0"),
+    lambda: [
+        _make_constrained_deck(_EXTRA),
+        _make_constrained_deck(_JOINT),
+        _make_constrained_deck(_EXTRA.replace("  8  ", "  1  ")),
+        _make_constrained_deck(_SPOTWELD, "         1         0"),
+    ]
 )
 @make_rule_decorator(
     "D2R113",
@@ -323,16 +336,23 @@ def _check_other_constraints(case: Case) -> Iterator[Objection]:
 
 
 @set_passing(
-    PASS,
-    _make_joined_deck(
-        _JOINING_JOINT, "         0         1", "1", "         2         1      PART"
-    ),
-    _make_joined_deck(_JOINING_WELD, "         1         0", "1", "2"),
+    lambda: [
+        PASS,
+        _make_joined_deck(
+            _JOINING_JOINT,
+            "         0         1",
+            "1",
+            "         2         1      PART",
+        ),
+        _make_joined_deck(_JOINING_WELD, "         1         0", "1", "2"),
+    ]
 )
 @set_failing(
-    _make_joined_deck(_JOINING_JOINT, "         0         1", "1", "2"),
-    _make_joined_deck(_SET + _BODY + _HELD_JOINT, "         1         0", "1", "2"),
-    _make_joined_deck(_JOINING_WELD, "         0         1", "1"),
+    lambda: [
+        _make_joined_deck(_JOINING_JOINT, "         0         1", "1", "2"),
+        _make_joined_deck(_SET + _BODY + _HELD_JOINT, "         1         0", "1", "2"),
+        _make_joined_deck(_JOINING_WELD, "         0         1", "1"),
+    ]
 )
 @make_rule_decorator(
     "D2R121",
@@ -352,12 +372,16 @@ def _check_separated_joints(case: Case) -> Iterator[Objection]:
 
 
 @set_passing(
-    PASS,
-    make_deck(_MERGED.replace("1         2", "7         8") + THERE + BACK),
+    lambda: [
+        PASS,
+        make_deck(_MERGED.replace("1         2", "7         8") + THERE + BACK),
+    ]
 )
 @set_failing(
-    make_deck(_MERGED + THERE + BACK),
-    make_deck(_MERGED.replace("1         2", "2         1") + THERE + BACK),
+    lambda: [
+        make_deck(_MERGED + THERE + BACK),
+        make_deck(_MERGED.replace("1         2", "2         1") + THERE + BACK),
+    ]
 )
 @make_rule_decorator("D2R122", WARNING, "a switched part on *CONSTRAINED_RIGID_BODIES")
 def _check_merged_bodies(case: Case) -> Iterator[Objection]:

@@ -1,6 +1,6 @@
 """Judge the windows of a deck by the energy history of a reference run, with the same code as ``verify``.
 
-The rules do not import this module, because a check that has no history needs no numerics and so starts faster.
+The rules do not import this module, because a check without a history needs no numerics and therefore starts faster.
 """
 
 from __future__ import annotations
@@ -38,10 +38,10 @@ from d2rpick.histories.surroundings import UNKNOWN
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator
 
+    from d2rpick.base.spans import Times
     from d2rpick.choice.pair.candidates import Pair
     from d2rpick.choice.pair.decision import Decision
     from d2rpick.choice.pair.situation import Situation
-    from d2rpick.choice.switched.switched_run import Times
     from d2rpick.deck.switching import SwitchWindow
     from d2rpick.histories.history import History
     from d2rpick.histories.opening import OpenedRun, Selection
@@ -56,7 +56,9 @@ _KEPT: Final = (
     "few-states",
     WRONG_ENERGY,
 )
-_UNKNOWN: Final = "the history does not show when the load ends; give that time with --after (in Python: after)"
+_UNKNOWN: Final = (
+    "the history does not show when the load ends; give that time with `after`"
+)
 
 
 class Fault(NamedTuple):
@@ -78,10 +80,10 @@ class Judgement(NamedTuple):
 class HistoryJudge:
     """Judges windows by the energy of the switched parts in a reference run or, without part data, that of the model.
 
-    The parts that are switched together are judged together, as ``suggest`` chooses one pair of times for them.
+    Parts that are switched together are judged together, because ``suggest`` chooses one pair of times for them.
 
-    ``selection`` names the parts or the energy to judge by; with a named energy it applies to all windows. ``done`` are
-    the windows in which the run was switched already: the run cannot judge these.
+    ``selection`` names the parts or the energy by which windows are judged; a named energy applies to all windows.
+    ``done`` contains the windows in which the run is already switched, and which it therefore cannot judge.
     """
 
     run: OpenedRun
@@ -147,9 +149,12 @@ class HistoryJudge:
     ) -> Judgement:
         """Judge a window. If td is missing or not later than tr, judge only tr.
 
-        ``together`` are the parts that are switched at the same times.  One that a force switches (``by_force``) is
-        judged between states of the history.
+        ``together`` contains the parts that are switched at the same times. A window that a force switches
+        (``by_force``) is judged between states of the history.
         """
+        if window.closed is None and window.opened.by.kind == "plain":
+            # A part that is rigid from the start to the end of the run has no time that a history could judge.
+            return Judgement()
         td = window.td if window.td is not None and window.td > window.tr else None
         history_parts = self._known
         if (
@@ -217,7 +222,7 @@ class HistoryJudge:
     ) -> tuple[tuple[float, float], ...] | None:
         """Return the spans in which the force of a contact, interface or wall acts [time]; None if no file contains it.
 
-        ``least``: only a force above it counts [force].
+        Only a force above ``least`` is used [force].
         """
         force = find_force(self.run.contact_forces, kind, number)
         force_spans = find_force_times(force, least) if force else None
@@ -298,7 +303,7 @@ def find_faults(verdict: PairVerdict) -> Iterator[Fault]:
         # One mistake should cause only one finding.
         and not any(fault.at_td for fault in limit_faults)
     ):
-        better = find_better_pair(situation)
+        better = decision.better or find_better_pair(situation)
         cure = _name_pair(better) if better else "no better td was found"
         problem = f"{situation.kinetic_share:.0%} of the vibration energy is kinetic at td = {situation.td:.6g}"
         yield Fault("D2R203", True, f"{problem} and is lost for every tr; {cure}")
@@ -388,9 +393,13 @@ def _judge_limits(verdict: PairVerdict) -> Iterator[Fault]:
 def _suggest_cure(verdict: PairVerdict) -> str:
     """Suggest a tr that suits this td, a better pair, or where to look for one.
 
-    A td at which most of the vibration energy is lost has no suitable tr, so that D2R203 and this cure name one pair.
+    If most of the vibration energy is lost at td, no tr is suitable, and this cure names the same pair as D2R203.
     """
     situation = verdict.situation
+    better = verdict.decision.better
+    if better and better.td != situation.td:
+        # The verdict names this pair as well.
+        return _name_pair(better)
     if _loses_most(situation):
         better = find_better_pair(situation)
         if better:

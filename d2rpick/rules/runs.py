@@ -112,16 +112,20 @@ def _find_switching_legs(case: RunCase) -> list[RadiossLeg]:
     return case.run.legs if any(leg.switched for leg in case.run.legs) else []
 
 
-@set_passing(GOOD_RUN, make_run(write_engine_files(("0.05", "ON"), ("0.05", "OFF"))))
+@set_passing(
+    lambda: [GOOD_RUN, make_run(write_engine_files(("0.05", "ON"), ("0.05", "OFF")))]
+)
 @set_failing(
-    make_run(write_engine_files(("0.09", "OFF"), ("0.02", "ON"), ("0.2", "OFF"))),
-    make_run(
-        {
-            name: text
-            for name, text in write_engine_files(*WINDOW).items()
-            if "0002" not in name
-        }
-    ),
+    lambda: [
+        make_run(write_engine_files(("0.09", "OFF"), ("0.02", "ON"), ("0.2", "OFF"))),
+        make_run(
+            {
+                name: text
+                for name, text in write_engine_files(*WINDOW).items()
+                if "0002" not in name
+            }
+        ),
+    ]
 )
 @make_rule_decorator(
     "D2R401",
@@ -168,10 +172,12 @@ def _check_order(case: RunCase) -> Iterator[Objection]:
             )
 
 
-@set_passing(GOOD_RUN, make_run(write_engine_files(*WINDOW, node="0")))
+@set_passing(lambda: [GOOD_RUN, make_run(write_engine_files(*WINDOW, node="0"))])
 @set_failing(
-    make_run(write_engine_files(*WINDOW, node="1")),
-    make_run(write_engine_files(*WINDOW, node="1808 77")),
+    lambda: [
+        make_run(write_engine_files(*WINDOW, node="1")),
+        make_run(write_engine_files(*WINDOW, node="1808 77")),
+    ]
 )
 @make_rule_decorator(
     "D2R402",
@@ -214,8 +220,12 @@ def _check_main_nodes(case: RunCase) -> Iterator[Objection]:
                 )
 
 
-@set_passing(GOOD_RUN, make_run(write_engine_files(("0.09", "ON"), ("0.2", "OFF"))))
-@set_failing(make_run(write_engine_files(("0.02", ""), ("0.09", "ON"), ("0.2", "OFF"))))
+@set_passing(
+    lambda: [GOOD_RUN, make_run(write_engine_files(("0.09", "ON"), ("0.2", "OFF")))]
+)
+@set_failing(
+    lambda: [make_run(write_engine_files(("0.02", ""), ("0.09", "ON"), ("0.2", "OFF")))]
+)
 @make_rule_decorator(
     "D2R403",
     WARNING,
@@ -257,14 +267,19 @@ def _check_never_off(case: RunCase) -> Iterator[Objection]:
 
 
 @set_passing(
-    GOOD_RUN, make_run(write_engine_files(("0.09", "ON"), ("0.1", ""), ("0.2", "OFF")))
+    lambda: [
+        GOOD_RUN,
+        make_run(write_engine_files(("0.09", "ON"), ("0.1", ""), ("0.2", "OFF"))),
+    ]
 )
 @set_failing(
-    make_run(
-        write_engine_files(
-            ("0.02", "OFF"), ("0.05", "ON"), ("0.09", "ON"), ("0.2", "OFF")
+    lambda: [
+        make_run(
+            write_engine_files(
+                ("0.02", "OFF"), ("0.05", "ON"), ("0.09", "ON"), ("0.2", "OFF")
+            )
         )
-    )
+    ]
 )
 @make_rule_decorator(
     "D2R411",
@@ -294,17 +309,21 @@ def _check_on_again(case: RunCase) -> Iterator[Objection]:
 
 
 @set_passing(
-    GOOD_RUN,
-    make_run(
-        write_engine_files(*WINDOW, cap=""),
-        write_starter_deck().replace(
-            "/RBODY", "/SHELL/2\n         2         1\n/RBODY"
+    lambda: [
+        GOOD_RUN,
+        make_run(
+            write_engine_files(*WINDOW, cap=""),
+            write_starter_deck().replace(
+                "/RBODY", "/SHELL/2\n         2         1\n/RBODY"
+            ),
         ),
-    ),
+    ]
 )
 @set_failing(
-    make_run(write_engine_files(*WINDOW, cap="")),
-    make_run(write_engine_files(*WINDOW, cap="1e-5 1e-3")),
+    lambda: [
+        make_run(write_engine_files(*WINDOW, cap="")),
+        make_run(write_engine_files(*WINDOW, cap="1e-5 1e-3")),
+    ]
 )
 @make_rule_decorator(
     "D2R404",
@@ -355,7 +374,7 @@ def _has_deformable(case: RunCase, rigid: set[int]) -> bool:
     return not parts or bool(parts - rigid)
 
 
-@set_failing(make_run(_MIXED))
+@set_failing(lambda: [make_run(_MIXED)])
 @make_rule_decorator("D2R405", WARNING, "engine files with different /VERS", (RADIOSS,))
 def _check_versions(case: RunCase) -> Iterator[Objection]:
     """/VERS defines how the fields of an engine file are read. Source: Altair's help for /VERS. No run has shown that
@@ -385,12 +404,14 @@ def _report_flaws(case: RunCase, *, code: str) -> Iterator[Objection]:
 
 
 @set_passing(
-    GOOD_RUN,
-    _make_wheel_run("1809"),
-    _make_wheel_run(members=(5, 6, 7)),
-    make_run(write_engine_files(("0.2", "OFF")), _make_wheel_run().deck),
+    lambda: [
+        GOOD_RUN,
+        _make_wheel_run("1809"),
+        _make_wheel_run(members=(5, 6, 7)),
+        make_run(write_engine_files(("0.2", "OFF")), _make_wheel_run().deck),
+    ]
 )
-@set_failing(_make_wheel_run())
+@set_failing(lambda: [_make_wheel_run()])
 @make_rule_decorator(
     "D2R408",
     WARNING,
@@ -414,8 +435,10 @@ def _check_left_rigid(case: RunCase) -> Iterator[Objection]:
         )
 
 
-@set_passing(GOOD_RUN, _make_wheel_run(), _make_wheel_run()._replace(history=_SPRING))
-@set_failing(_make_wheel_run(part=3)._replace(history=_SPRING))
+@set_passing(
+    lambda: [GOOD_RUN, _make_wheel_run(), _make_wheel_run()._replace(history=_SPRING)]
+)
+@set_failing(lambda: [_make_wheel_run(part=3)._replace(history=_SPRING)])
 @make_rule_decorator(
     "D2R409",
     ERROR,
@@ -450,11 +473,13 @@ def _find_left_rigid_parts(
     ) if left_bodies and case.judge else None
 
 
-@set_passing(GOOD_RUN, _make_run_with(_NODES, _write_wall(8)))
+@set_passing(lambda: [GOOD_RUN, _make_run_with(_NODES, _write_wall(8))])
 @set_failing(
-    _make_run_with("/GRNOD/BOX/8\nbox\n", _write_row(1), _write_wall(8)),
-    _make_run_with(_write_velocity(8)),
-    _make_run_with(_PLACES, "/TRANSFORM/TRA/1\n", _write_wall(0, 0, 0.1)),
+    lambda: [
+        _make_run_with("/GRNOD/BOX/8\nbox\n", _write_row(1), _write_wall(8)),
+        _make_run_with(_write_velocity(8)),
+        _make_run_with(_PLACES, "/TRANSFORM/TRA/1\n", _write_wall(0, 0, 0.1)),
+    ]
 )
 @make_rule_decorator(
     "D2R307",
@@ -473,16 +498,20 @@ def _report_unknown_nodes(case: RunCase) -> Iterator[Objection]:
 
 
 @set_passing(
-    GOOD_RUN,
-    _make_run_with(_NODES, _write_wall(8, 8)),
-    make_run(_LEGS, f"{_KEEPS}{_NODES.replace('/8', '/7')}{_write_wall(7)}/END\n"),
-    _make_run_with(_PLACES, _write_wall(0, 0, 0.01)),
-    make_run({}, write_starter_deck(more=_NODES + _write_wall(8))),
+    lambda: [
+        GOOD_RUN,
+        _make_run_with(_NODES, _write_wall(8, 8)),
+        make_run(_LEGS, f"{_KEEPS}{_NODES.replace('/8', '/7')}{_write_wall(7)}/END\n"),
+        _make_run_with(_PLACES, _write_wall(0, 0, 0.01)),
+        make_run({}, write_starter_deck(more=_NODES + _write_wall(8))),
+    ]
 )
 @set_failing(
-    _make_run_with(_NODES, _write_wall(8)),
-    _make_run_with(_PLACES, _write_wall(0, 0, 0.1)),
-    _make_run_with(_write_wall(7)),
+    lambda: [
+        _make_run_with(_NODES, _write_wall(8)),
+        _make_run_with(_PLACES, _write_wall(0, 0, 0.1)),
+        _make_run_with(_write_wall(7)),
+    ]
 )
 @make_rule_decorator(
     "D2R406",
@@ -503,16 +532,20 @@ def _check_walls(case: RunCase) -> Iterator[Objection]:
 
 
 @set_passing(
-    GOOD_RUN,
-    _make_run_with(_NODES, _write_velocity(8), _MAIN, _write_velocity(9)),
-    _make_run_with(_NODES, _write_velocity(8, 0.0)),
-    _make_started_run("OFF", 1, 4),
-    _make_started_run("ON", 1, 1808),
+    lambda: [
+        GOOD_RUN,
+        _make_run_with(_NODES, _write_velocity(8), _MAIN, _write_velocity(9)),
+        _make_run_with(_NODES, _write_velocity(8, 0.0)),
+        _make_started_run("OFF", 1, 4),
+        _make_started_run("ON", 1, 1808),
+    ]
 )
 @set_failing(
-    _make_run_with(_NODES, _write_velocity(8)),
-    _make_run_with(_write_velocity(7)),
-    _make_started_run("ON", 1, 4),
+    lambda: [
+        _make_run_with(_NODES, _write_velocity(8)),
+        _make_run_with(_write_velocity(7)),
+        _make_started_run("ON", 1, 4),
+    ]
 )
 @make_rule_decorator(
     "D2R407",
@@ -543,9 +576,12 @@ def _make_sensed_run(*lines: str) -> Example:
 
 
 @set_passing(
-    GOOD_RUN, _make_sensed_run(_write_row(0.02, width=20), _write_row(0.09, width=20))
+    lambda: [
+        GOOD_RUN,
+        _make_sensed_run(_write_row(0.02, width=20), _write_row(0.09, width=20)),
+    ]
 )
-@set_failing(_make_sensed_run(_write_row(0.02, 0.09, width=20)))
+@set_failing(lambda: [_make_sensed_run(_write_row(0.02, 0.09, width=20))])
 @make_rule_decorator(
     "D2R412",
     WARNING,

@@ -43,7 +43,7 @@ def check_driven(
     Raises
     ------
     DeckError
-        If a support holds the parts, nothing can end a flight, or the history lacks momenta of parts.
+        If a support holds the parts, no contact can end a flight, or the history does not contain part momenta.
     RangeError
         If no flight of the run can last for the ``wait`` or keep the margin of the ``limits``.
     """

@@ -59,13 +59,14 @@ class Driven:
     Attributes
     ----------
     windows : tuple of Window
-        All flights, switched or left out.
+        All flights, whether or not they were switched.
     legs : tuple of Leg
-        All computed legs.
+        All computed engine runs.
     why : str
-        Why the wait has this length.
+        Reason for the length of the waiting time.
     saved : (float or None, float or None)
-        Saved fraction of the cost of a deformable run, by the cost model and by CPU time; None if unknown.
+        Saved fraction of the cost of a deformable run according to the cost model, and to the CPU times [-]; None if
+        unknown.
     """
 
     run: OpenedRun
@@ -81,7 +82,7 @@ class Driven:
 class Driver:
     """Computes one run in its folder, continuing after the last record of its journal.
 
-    ``report`` is called with each event, in one line.  ``at`` is the leg that is being computed.
+    ``report`` is called with a line of text for each event. ``at`` is the engine run that is being computed.
     """
 
     deck: DrivenDeck
@@ -124,7 +125,7 @@ class Driver:
         Raises
         ------
         D2RPickError
-            If the solver fails or the disk is full.  The run continues from there when it is driven again.
+            If the solver fails or the disk is full. The next call of `drive` continues the run from there.
         """
         if legs := self.journal.legs:
             self.report(
@@ -331,7 +332,7 @@ def _choose_end(order: Order, history: History, free: float) -> float:
 class Journal:
     """The journal of a driven run. Records are only appended; each record is on the disk when `add` returns.
 
-    A cut or damaged line is ignored: what it reports is done again.
+    A truncated or damaged line is ignored, and the step that it records is repeated.
     """
 
     def __init__(self, path: Path) -> None:

@@ -70,7 +70,7 @@ class Commands(NamedTuple):
         Raises
         ------
         ConfigurationError
-            If the command cannot be split or does not name the deck, or no installation is known.
+            If the command cannot be split or does not contain the deck, or if no installation is known.
         """
         template = getattr(self, program) or _find_installed(program)
         if "{deck}" not in template:
@@ -150,7 +150,7 @@ def _lock(path: Path) -> int | None:
 class Solver:
     """The solver in the folder of a run. Only one process runs at a time.
 
-    The process keeps a lock while it lives, so that a later driver can see it.
+    The process holds a lock as long as it runs, so that a later driver can detect it.
     """
 
     def __init__(self, folder: Path, name: str, commands: Commands) -> None:
@@ -176,7 +176,8 @@ class Solver:
     def set_aside(self, number: int) -> None:
         """Move the files of a complete engine run to a folder of their own, because another one gets its number.
 
-        The listing is moved last: while it is there, an earlier driver may have been stopped before the other files.
+        The listing is moved last: if it is still in the folder, an earlier driver was stopped before all files were
+        moved.
         """
         if not self.ended_well(number):
             return
@@ -208,7 +209,7 @@ class Solver:
         Raises
         ------
         D2RPickError
-            If it cannot be started.
+            If the program cannot be started.
         """
         command = self.commands.words(program, self.file(number, ".rad").name)
         lock = _lock(self._lock_path)
@@ -277,8 +278,8 @@ class Solver:
     def whole(self, number: int) -> bool:
         """Return True if an engine run, or the starter (number 0), has left complete restart files for all domains.
 
-        An OpenRadioss restart file begins with its own name.  It is as long as the starter's file, apart from contact
-        data.  A full disk leaves shorter restarts although the listing reports a normal end.
+        An OpenRadioss restart file begins with its own name and, apart from contact data, is as long as that of the
+        starter. If the disk is full, restart files are shorter although the listing reports a normal end.
         """
         starter_restarts = self._find_restarts(0)
         for first in starter_restarts:

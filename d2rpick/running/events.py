@@ -34,9 +34,9 @@ class EnergyRange(NamedTuple):
 class RunEvent(NamedTuple):
     """An event of a run: a keyword for scripts, its time, and the state at which it was ``seen`` [time].
 
-    ``flight`` is the flight of the event, as it was detected.  ``tr`` is the advised time [time], ``energy`` the
-    internal energy on which the advice is based, and ``swing`` the part that oscillates too strongly at ``tr``.  Each
-    is None if it does not apply to the event.
+    ``flight`` is the flight to which the event belongs, as it was detected. ``tr`` is the advised time [time],
+    ``energy`` the internal energy on which the advice is based, and ``swing`` the part that oscillates too strongly at
+    ``tr``. Each is None if it does not apply to the event.
     """
 
     event: str
@@ -51,12 +51,12 @@ class RunEvent(NamedTuple):
 def find_events(evidence: GrowingEvidence) -> tuple[RunEvent, ...]:
     """Return all events in the order of their detection.
 
-    The events of a run so far are the first ones of the whole run.  The evidence keeps those of past flights.
+    The events so far are always the first events of the complete run. The evidence keeps the events of past flights.
 
     Raises
     ------
     RangeError
-        If a given wait is too short.
+        If the waiting time that the user gave is too short.
     """
     flights = evidence.flights()
     history = evidence.history
@@ -107,7 +107,7 @@ def _list_events_of(
 def _suggest_switch(history: History, flight: SeenFlight) -> Iterator[RunEvent]:
     """Advise when to switch in a flight: at once if nothing vibrates, otherwise while the internal energy is high.
 
-    If it is low for one wait, the time of its maximum is advised.
+    If the energy stays low for a whole waiting time, the time of its maximum is advised.
     """
     if flight.wait.source == "at-rest":
         yield RunEvent("switch", flight.seen, flight.seen, tr=flight.seen)

@@ -35,7 +35,7 @@ _ROUND_OFF: Final = 1e-6
 class GrowingEvidence:
     """Finds the force-free time and the flights of the parts in a growing record.
 
-    ``given`` is the user's waiting time [time], ``of_deck`` and ``before`` are those of the inner ``motion``.
+    ``given`` is the waiting time that the user gave [time]. ``of_deck`` and ``before`` are those of `InnerMotion`.
     """
 
     history: History
@@ -80,8 +80,8 @@ class GrowingEvidence:
     ) -> MovingParts:
         """Append part momenta to the evidence for each set of parts that may fly together, and return the moving parts.
 
-        The evidence of a set ends at a state at which the part momenta do not add up to the momentum of the model, as
-        when a rigid body has absorbed some parts.
+        The evidence of a set ends at a state at which the part momenta do not add up to the momentum of the model, for
+        example because a rigid body has absorbed some parts.
         """
         assert momenta.parts is not None
         are_complete = is_complete(momenta, of_model, self._largest_momentum)
@@ -118,7 +118,7 @@ class GrowingEvidence:
     ) -> None:
         """Append states to the evidence for a set of parts; after states without momentum, begin the evidence anew.
 
-        ``columns`` are those of `GrowingWitness.add`, from the ``written`` momenta and energies.
+        ``columns`` are the columns that `GrowingWitness.add` needs, from the ``written`` momenta and energies.
         """
         precisions = [table.precision if table else EXACT for table in written]
         has_momentum = ~np.isnan(columns[:, 2])
@@ -134,7 +134,7 @@ class GrowingEvidence:
     def flights(self) -> tuple[SeenFlight, ...]:
         """Return all flights that lasted for the required force-free time, in ascending order.
 
-        As the run goes on, flights are only added, and the last one gets its ``end``.
+        As the run proceeds, flights are only added, and the last flight gets its ``end``.
         """
         candidates: list[tuple[SeenFlight, float]] = []
         for witness in self.witnesses:
@@ -189,7 +189,7 @@ class GrowingEvidence:
     ) -> float | None:
         """Return the gravity between two states, as `Laws.gravity` does; None if a support holds parts.
 
-        Only states up to the last one are used, and of a long record only some.
+        No later states are used, and only some of the states of a long record.
         """
         history = self.history
         if history.surroundings.held(history.parts, float(witness.time[last])):
@@ -228,7 +228,7 @@ class GrowingEvidence:
     def find_contact(self, fewest: int = FEWEST) -> float | None:
         """Return the time of the first state at which a force acts [time]; None if no force acts.
 
-        A witness is used if it has at least ``fewest`` states from the first one of the record on.
+        A witness is used if it covers at least ``fewest`` states, beginning with the first state of the record.
         """
         for witness in self.witnesses:
             begins = witness.time[0] <= self.history.time[0]
@@ -240,7 +240,7 @@ class GrowingEvidence:
     def find_rigid_times(self) -> Iterator[tuple[float, ...]]:
         """Yield the periods in which the part momenta were those of rigid bodies, as (start, detection, end) [time].
 
-        The last of these periods may last to the end of the record.
+        The last period may extend to the end of the record.
         """
         momenta = self.history.find_momenta(of_parts=True)
         for stretch in find_stretches(self._complete.rows == 0, FEWEST):
@@ -260,7 +260,7 @@ def _make_columns(
 ) -> Samples:
     """Return time, contact energy and momentum as columns (k, 5); an energy that is not written is NaN.
 
-    The momentum is that of the ``members`` of the momenta, or zero if there are none.
+    The momentum is the sum over the ``members`` (part indices), or zero if there are none.
     """
     table = momenta or contact
     if table is None:
@@ -276,7 +276,7 @@ def _make_columns(
 def _list_sets(momenta: Momenta) -> tuple[tuple[int, ...], ...]:
     """Return the sets of parts that may fly together: the chosen parts with all connected parts, and all parts.
 
-    Parts are given by their numbers in the momenta.
+    Parts are represented by their indices in the momenta.
     """
     assert momenta.parts is not None
     ids = [part.id for part in momenta.parts]

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from d2rpick.base.errors import ArgumentError
 from d2rpick.deck import read_inventory
-from d2rpick.deck.first_run_cards import print_first_run_cards
+from d2rpick.deck.first_run_cards import FirstRun, print_first_run_cards
 from d2rpick.deck.radioss_run import find_parts_off, read_run
 from d2rpick.running.checks import refuse_held
 from d2rpick.running.inner_motion import Wait, check_wait, wait_of_deck
@@ -24,32 +24,34 @@ def first_card(
     wait: float | None = None,
     after: float | None = None,
 ) -> tuple[PrintedCard, Wait]:
-    """Print the cards with which the first run of a deck switches its parts by contact forces.
+    """Print the cards that switch the parts in the first run of a deck, triggered by contact forces.
 
     Parameters
     ----------
     path : str
         Main deck of LS-DYNA, or a file of a Radioss run with one engine file.
     parts : collection of int
-        Parts to be switched; Radioss: by default the parts of the bodies that the engine file deactivates.
+        Parts to be switched; for Radioss, the default is the parts of the rigid bodies that the engine file
+        deactivates.
     wait : float, optional
-        Force-free time that shows a flight [time]; by default half of the longest period of the deck's springs.
+        Force-free time after which a flight is detected [time]; by default, half of the longest period of the deck's
+        springs.
     after : float, optional
         No part becomes rigid before this time [time].
 
     Returns
     -------
     (PrintedCard, Wait)
-        The card, with notes for the user, and its waiting time (the force-free time after which a flight is detected).
+        The card with notes for the user, and its waiting time (the force-free time after which a flight is detected).
 
     Raises
     ------
     DeckError
         If the deck has no contact that shows a flight, or if other loads than contacts and gravity act on the parts.
     RangeError
-        If the wait is below half of a period that is known.
+        If the waiting time is shorter than half of a known period.
     ArgumentError
-        If the wait or the parts are not given and do not follow from the deck.
+        If the waiting time or the parts are not given and do not follow from the deck.
     """
     inventory = read_inventory(path)
     chosen = tuple(parts)
@@ -61,10 +63,8 @@ def first_card(
         )
     refuse_held(path, inventory, chosen)
     needed = _choose_wait(path, inventory, wait)
-    card = print_first_run_cards(
-        path, inventory, chosen, needed.time, needed.reason, after
-    )
-    return card, needed
+    first_run = FirstRun(path, inventory, chosen, needed.time, needed.reason, after)
+    return print_first_run_cards(first_run), needed
 
 
 def _choose_wait(path: str, inventory: Inventory, given: float | None) -> Wait:

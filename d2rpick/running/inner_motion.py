@@ -1,8 +1,9 @@
 """Determine the waiting time (the force-free time after which a flight is detected) from oscillations inside the body.
 
-The wait is half of the longest inner period.  Inside a load, contacts open and close as parts swing on their springs,
-and the longest gap between them is shorter than that (measured: 13 of 17 ms in a falling box, 14 of 22 ms in a car).  A
-shorter wait treats such a gap as a flight, and a body frozen in it cannot rebound as it would have done.
+The waiting time is half of the longest internal period. During a load, contacts open and close as parts oscillate on
+their springs, and the longest gap between them is shorter than half of this period (in computed runs, 13 of 17 ms for a
+falling box, and 14 of 22 ms for a car). With a shorter waiting time, such a gap would be treated as a flight, and a
+body that is frozen in it could not rebound correctly.
 """
 
 from __future__ import annotations
@@ -50,8 +51,8 @@ _HEAVY: Final = 0.05
 class Wait(NamedTuple):
     """Force-free time after which a flight is detected [time], with its source and a reason.
 
-    ``source``: "given", "record", "deck" or "at-rest".  ``least`` is a lower bound of half of a period of the deck
-    [time]; None if that is the wait itself.
+    ``source`` is "given", "record", "deck" or "at-rest". ``least`` is a lower bound of half of the deck's period
+    [time]; it is None if the waiting time is this half period itself.
     """
 
     time: float
@@ -63,7 +64,7 @@ class Wait(NamedTuple):
 class _HalfPeriod(NamedTuple):
     """Half a period of an internal ``motion``, from ``begin`` to ``end``, detected at the time ``seen_at`` [time].
 
-    ``half`` is half of its period [time], ``strength`` its mean change by time.
+    ``half`` is half of its period [time], and ``strength`` its mean rate of change [unit of the values/time].
     """
 
     motion: _Motion
@@ -77,7 +78,8 @@ class _HalfPeriod(NamedTuple):
 class _Motion:
     """One oscillating quantity, such as a velocity component of a part, with its states and half periods so far.
 
-    Half a period takes ``halves_per_swing`` swings of its values: 1 for a velocity, 2 for an energy.
+    ``halves_per_swing`` is the number of changes of the values from one extremum to the next in half a period: 1 for a
+    velocity, 2 for an energy.
     """
 
     def __init__(self, name: str, halves_per_swing: float = 1.0) -> None:
@@ -118,20 +120,26 @@ class _Motion:
 
     def _begin(self, rows: Samples) -> None:
         """Begin to follow a motion that is first detected at the last of its states."""
-        distance = np.abs(rows[:, 1] - rows[-1, 1])
+        time, values = rows[:, 0], rows[:, 1]
+        distance = np.abs(values - values[-1])
         self._extreme = len(rows) - 1
         self._turn = self._extreme - int(np.argmax(distance[::-1]))
-        self._sign = int(np.sign(rows[-1, 1] - rows[self._turn, 1]))
-        now = float(rows[-1, 0])
+        self._sign = int(np.sign(values[-1] - values[self._turn]))
+        now = float(time[-1])
         self._swings.append(_HalfPeriod(self, now, now, now))
 
     def _measure(self, rows: Samples, now: float) -> _HalfPeriod:
         """Measure the half period from the last extremum to the current extreme value, detected at ``now``."""
-        time, distance = rows[:, 0], np.abs(rows[:, 1] - rows[0, 1])
-        low = int(np.flatnonzero(distance <= _INNER * distance[-1])[-1])
-        high = low + int(np.argmax(distance[low:] >= (1 - _INNER) * distance[-1]))
-        half = self._factor * float(time[high] - time[low]) / _INNER_TIME
-        strength = float(distance[-1]) / half
+        time, values = rows[:, 0], rows[:, 1]
+        distance = np.abs(values - values[0])
+        whole = distance[-1]
+        is_low = distance <= _INNER * whole
+        low = int(np.flatnonzero(is_low)[-1])
+        is_high = distance[low:] >= (1 - _INNER) * whole
+        high = low + int(np.argmax(is_high))
+        inner_time = float(time[high] - time[low])
+        half = self._factor * inner_time / _INNER_TIME
+        strength = float(whole) / half
         begin, end = time[[0, -1]].tolist()
         self._swings.append(_HalfPeriod(self, begin, end, now, half, strength))
         return self._swings[-1]
@@ -139,7 +147,7 @@ class _Motion:
     def outlasts_earlier_swings(self, now: float, least_strength: float) -> bool:
         """Return True if the oscillation is much longer than all earlier ones and is neither rest nor rotation.
 
-        The mean change by time of a rotation is below ``least_strength``.
+        The mean rate of change due to a rotation is below ``least_strength``.
         """
         swings = [swing for swing in self._swings if swing.seen_at <= now]
         if not swings:
@@ -162,8 +170,8 @@ class _Motion:
 class _Longest(NamedTuple):
     """The longest half period of the internal motion so far, and the waiting time ``wait`` that it requires, if any.
 
-    ``since`` is the time of detection [time], ``strength`` the largest mean rate of change so far. ``swing`` is half of
-    the longest swing, even if a force pushed the swing [time].
+    ``since`` is the time of detection [time], and ``strength`` the largest mean rate of change so far. ``swing`` is
+    half of the longest oscillation period, even if a force acted during that oscillation [time].
     """
 
     since: float
@@ -175,7 +183,7 @@ class _Longest(NamedTuple):
 class InnerMotion:
     """The internal motion up to each state of a record, and the longest half period that it has shown.
 
-    ``of_deck`` is the deck's waiting time, ``before`` that of earlier flights [time].
+    ``of_deck`` is the waiting time that follows from the deck, ``before`` that of earlier flights [time].
     """
 
     def __init__(self, of_deck: Wait | None = None, before: float = 0.0) -> None:
@@ -244,7 +252,7 @@ class InnerMotion:
     ) -> None:
         """Lengthen the waiting time if a half period requires it that is neither a rotation nor lengthened by a force.
 
-        A half period under a force is used if there is no deck and this motion has not yet oscillated freely.
+        A half period during a force is used only if there is no deck and this motion has not yet oscillated freely.
         """
         for swing in sorted(swings, key=lambda swing: swing.seen_at):
             motion = swing.motion

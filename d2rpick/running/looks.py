@@ -1,6 +1,7 @@
 """Read the files of a run repeatedly while the run is being computed, and return the new states.
 
-Only the last states of a solver's histories are read again.  Files of other formats are read completely each time.
+Of time-history files written by a solver, only the last states are read again. Other files are read completely each
+time.
 """
 
 from __future__ import annotations
@@ -53,7 +54,7 @@ class Looks:
     def look(self, names: Sequence[str], wait_before: float = 0.0) -> bool:
         """Add the new states to the evidence, or begin the evidence anew; return True if there are new states.
 
-        ``wait_before`` is the waiting time of earlier flights [time].  Errors as `new_states`.
+        ``wait_before`` is the waiting time of earlier flights [time]. The errors are those of `new_states`.
         """
         states, follows = self.new_states(names)
         if not follows:
@@ -65,14 +66,14 @@ class Looks:
     def new_states(self, names: Sequence[str]) -> tuple[History, bool]:
         """Return the new states, and True if they continue the states that were read before.
 
-        If they do not, since files were written anew, all states are given.
+        If they do not, because files were written anew, all states are returned.
 
         Raises
         ------
         FormatError, HistoryError
-            If the files cannot be read, or have no history.
+            If the files cannot be read or contain no history.
         OSError
-            If a file is no longer there.
+            If a file no longer exists.
         """
         if not self._names <= {*names}:
             # If a file no longer exists, all files are read from their start.
@@ -103,7 +104,7 @@ class Looks:
         """Read the last states of each file, including some known states, and read new files completely.
 
         Files without a resume point, such as files with forces only, are not read again.  Return None if a file cannot
-        be read from its resume point, as when it was written anew.
+        be read from its resume point, for example because it was written anew.
         """
         if not self.resume_points:
             return None
@@ -128,7 +129,7 @@ class Looks:
     ) -> tuple[History, dict[str, ResumePoint]]:
         """Return the history in the files, without an incomplete last state, and where to resume reading each file.
 
-        The positions are {} if the format of a file is always read as a whole.
+        The positions are empty if files of this format are always read completely.
         """
         run = open_sources(sources, self._selection)
         points = join_resume_points(

@@ -114,7 +114,7 @@ def _join_tables(tables: Sequence[Any]) -> History:
 def _select_new_states(table: Table, known_table: Table | None) -> Table | None:
     """Return the states of a table after the last known one; None if the table lacks that state or has changed it.
 
-    The last state is left out if a later state with the same printed time may still replace it.
+    The last state is omitted if a later state with the same printed time may still replace it.
     """
     new_states = slice(0, table.time.size - _is_unsettled(table))
     if known_table is None or not known_table.time.size:

@@ -1,8 +1,8 @@
 """Choose the next engine run (leg) of a run that chooses its own switching times, from the results so far.
 
-The end of a leg is fixed before the leg begins.  The same command therefore computes the same legs, however fast the
-machine is.  A leg that replaces a discarded one gets its number.  If a probe has replaced a deformable leg and its
-window is not used, that leg follows once more.
+The end of an engine run is fixed before it starts, so the same command computes the same engine runs on any machine. An
+engine run that replaces a discarded one gets its number. If a probe has replaced a deformable engine run and the window
+of the probe is not used, the deformable engine run is computed again.
 """
 
 from __future__ import annotations
@@ -50,8 +50,8 @@ _WORTH: Final = 0.04
 class Limits(NamedTuple):
     """Limits that apply to all engine runs [time].
 
-    ``interval`` is the interval of the history, ``shortest`` the least margin, ``margin`` the one the user gave.
-    ``rigid_cycle`` is the cost of a cycle with rigid parts over the cost of a deformable cycle [-].
+    ``interval`` is the output interval of the history, ``shortest`` the smallest margin, and ``margin`` the margin that
+    the user gave. ``rigid_cycle`` is the cost of a cycle with rigid parts divided by that of a deformable cycle [-].
     """
 
     end: float
@@ -63,8 +63,8 @@ class Limits(NamedTuple):
     def margin_of(self, flight: float, *, idle: bool = False) -> float:
         """Return the margin before the contact that ends a flight of the given length [time].
 
-        If nothing vibrates (``idle``), a rigid body flies like the deformable one, and the least margin is enough.
-        Otherwise the margin is at least a fraction of the flight that was enough in 8 windows of two structures.
+        If nothing vibrates (``idle``), a rigid body flies like the deformable one, and the smallest margin suffices.
+        Otherwise the margin is at least a fraction of the flight that sufficed in 8 windows of two structures.
         """
         if self.margin is not None:
             return self.margin
@@ -100,7 +100,7 @@ class Order(NamedTuple):
         return self.kind != LOAD
 
     def undone(self) -> Order:
-        """Return the order at the end of the previous engine run, as if this engine run had not been computed."""
+        """Return the order to repeat this engine run, from the end of the previous one."""
         return self._replace(number=self.number - 1, until=self.start)
 
     def following(self, kind: str, until: float) -> Order:
@@ -116,25 +116,25 @@ class LegFindings(NamedTuple):
     free : float
         Start of the current force-free time [time].
     wait : float or None
-        Force-free time that shows a flight [time]; None while nothing determines it.
+        Force-free time after which a flight is detected [time]; None as long as it is unknown.
     why : str
-        Why the wait has this length.
+        Reason for the length of the waiting time.
     flies : bool
-        True if no force has acted for as long as the wait.
+        True if no force has acted for as long as the waiting time.
     tr : float
-        Start or end of the leg, whichever has the higher internal energy [time].
+        Start or end of the engine run, whichever has the higher internal energy [time].
     idle : bool
-        Whether the parts have never stored internal energy.
+        True if the parts have never stored internal energy.
     short : tuple of (float, float)
-        Start and end of each flight in the leg that was shorter than the wait [time].
+        Start and end of each force-free time in the engine run that was shorter than the waiting time [time].
     contact : float or None
         First contact of the rigid body [time].
     swing : float
-        Half of the longest swing so far, even if a push lengthened it [time].
+        Half of the longest oscillation period so far, even if a force lengthened it [time].
     steady_from : float
-        Length of the flight below which a swinging part displaces the body by more than 1 % of its path [time].
+        In a flight shorter than this, an oscillating part displaces the body by more than 1 % of its path [time].
     swing_warning : str
-        Warning about that part in a shorter flight, or "".
+        Warning about this part for a shorter flight, or "".
     """
 
     free: float = 0.0
@@ -153,7 +153,8 @@ class LegFindings(NamedTuple):
 class Leg(NamedTuple):
     """A completed engine run, with its number of ``cycles`` and CPU time ``cpu`` [s]; both None without a listing.
 
-    Both are zero if the engine run was replaced by a probe and then taken back instead of being computed again.
+    Both are zero if a probe had replaced the engine run and its files were then restored instead of being computed
+    again.
     """
 
     order: Order
@@ -170,8 +171,8 @@ class Leg(NamedTuple):
 class Window(NamedTuple):
     """A flight that was switched at ``tr`` and ``td``, or left deformable for the given ``reason``.
 
-    ``free`` is the start of the flight, ``contact`` the first contact of the rigid body, None if the run ended before.
-    ``warning`` is about a part that moves so much that the body may be out of place at td; otherwise "".
+    ``free`` is the start of the flight, and ``contact`` the first contact of the rigid body [time]; None if the run
+    ended before. ``warning`` names a part that moves so much that the body may be misplaced at td; otherwise it is "".
     """
 
     free: float
@@ -189,7 +190,7 @@ def choose_next_leg(legs: Sequence[Leg], limits: Limits) -> Order | None:
     Raises
     ------
     D2RPickError
-        If the solver has no number for one more leg.
+        If the solver has no number for a further engine run.
     """
     if not legs:  # The first engine run can show whether parts fall from rest.
         return Order(LOAD, 1, 0.0, min((FEWEST + 2) * limits.interval, limits.end))
@@ -222,7 +223,7 @@ def _starts_window(last: Order, findings: LegFindings, limits: Limits) -> bool:
 def _order_load(last: Order, findings: LegFindings, limits: Limits) -> Order:
     """Schedule a deformable engine run that is long enough to detect a flight that starts now or has already started.
 
-    The flight in which a window ends is not switched again.
+    A flight in which a window has ended is not switched again.
     """
     now, end = last.until, limits.end
     legs_left = MOST_LEGS - _KEPT_BACK - last.number

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 class Swing(NamedTuple):
     """An oscillating part: its ``name``, and the distance by which it can displace its body [length].
 
-    In a flight shorter than ``flight`` [time] the ``error`` is more than 1 % of the path, which is too much.
-    ``at_most`` is True if the error is an upper limit, because both parts may rotate instead, which displaces nothing.
+    In a flight shorter than ``flight`` [time], the ``error`` exceeds 1 % of the path, which is too large. ``at_most``
+    is True if the error is an upper limit, because the motion may be a rotation of both parts, which displaces nothing.
     """
 
     name: str
@@ -45,8 +45,8 @@ class Swing(NamedTuple):
 def find_swing(history: History, start: float, tr: float) -> Swing | None:
     """Find by how much an oscillating part can displace its body if the body becomes rigid at ``tr``.
 
-    td is unknown.  It is assumed at the state before tr at which the parts are farthest from their places at tr.  None
-    if the part momenta are not sufficient.
+    Because td is unknown, the parts at td are assumed to be in their position before tr that is farthest from that at
+    tr. The result is None if the part momenta do not suffice.
     """
     momenta = history.find_momenta(of_parts=True)
     if momenta is None or momenta.parts is None:
@@ -69,7 +69,7 @@ def _measure_pair(
 ) -> tuple[str, float, float] | None:
     """Return the lighter of two parts, an upper bound of the displacement, and the path; None if other parts move.
 
-    The displacement of the heavier part and the path of both are in the unit of length.
+    The upper bound is that of the displacement of the heavier part; the path is that of both parts [length].
     """
     inside = find_window(momenta.time, start, tr)
     time, masses = momenta.time[inside], momenta.masses

@@ -1,7 +1,7 @@
 """Watch a run while it is being computed, and find each event once; ``report.follow`` describes the events.
 
-Nothing is started, stopped or changed.  The pause after each read is 100 times as long as the read, so that watching
-takes 1 % of a processor core.
+The run is not affected in any way. The pause after each read is 100 times as long as the read, so that watching takes 1
+% of a processor core.
 """
 
 from __future__ import annotations
@@ -48,21 +48,21 @@ class News(NamedTuple):
     Attributes
     ----------
     start, now : float or None
-        First and last state of the run so far [time]; None if no state is written yet.
+        Times of the first and last states of the run so far [time]; None if no state is written yet.
     events : tuple of RunEvent
         New events.
     undone_events : tuple of RunEvent
-        Earlier events that the run no longer has, because it was restarted.
+        Earlier events that are no longer valid, because the run was restarted from an earlier time.
     flight : SeenFlight or None
-        Latest flight.
+        Latest flight; None if there is none yet.
     knows_wait : bool
-        True if it is known which force-free time shows a flight.
+        True if the waiting time is known, i.e. the force-free time after which a flight is detected.
     ending : str or None
-        How the run has ended, according to its listing; None if it may still be computed.
+        How the run ended according to its listing; None if it may still be running.
     silence : float or None
-        Time since the run last wrote output [s], if it is so long that it is to be reported.
+        Time since the last output of the run [s] if it is long enough to be reported, else None.
     error : D2RPickError or None
-        Why the files cannot be read yet.
+        Reason why the files cannot be read yet; None if they can be read.
     """
 
     start: float | None = None
@@ -79,7 +79,7 @@ class News(NamedTuple):
 class Watch:
     """Watches a run that is being computed.
 
-    ``names`` are its files or its folder, which need not exist yet.  ``looks`` read the files.
+    ``names`` are the files or the folder of the run, which need not exist yet. ``looks`` reads the files.
     """
 
     def __init__(
@@ -97,13 +97,13 @@ class Watch:
         self._report_silence_after = _SILENT
 
     def look(self) -> News:
-        """Read what was written since the last read.
+        """Read the output that was written since the last read, and return the news.
 
         Raises
         ------
         D2RPickError
-            If the files cannot be read although nothing is written to them any more, they contain nothing that shows a
-            force, or the given wait is too short.
+            If the files cannot be read although they no longer change, if they contain nothing that shows a force, or
+            if the waiting time that the user gave is too short.
         """
         files = find_files(self._names)
         news = self._news._replace(events=(), undone_events=(), silence=None)
@@ -155,7 +155,7 @@ def follow(
     names: Sequence[str], selection: Selection, wait: float | None = None, inventory: Inventory | None = None,
     *, lasting: float | None = None, rest: Callable[[float], None] = time.sleep,
 ) -> Iterator[News]:  # fmt: skip
-    """Yield the news of a run until it has ended, or for ``lasting`` [s]; see `Watch` for the other arguments."""
+    """Yield the events of a run until it ends or ``lasting`` [s] have passed; see `Watch` for the other arguments."""
     watch = Watch(names, selection, wait, inventory)
     end = time.monotonic() + (float("inf") if lasting is None else lasting)
     while True:

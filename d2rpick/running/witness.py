@@ -1,12 +1,13 @@
-"""Find, at each state of a record, the force-free time of the given parts or the model from the states so far.
+"""At each state of a record, find how long the parts or the model have been free of forces, from the states so far.
 
-In this time the momentum less gravity and damping is constant within 1e-4 of its largest value so far.  If no momentum
-is written, the contact energy is constant instead.  A flight is seen once this has lasted for the wait, since a force
-that ends may act again: a car hit a block twice, 14 ms apart (docs/reference/first-run.md).
+In the force-free time, the momentum without the effects of gravity and damping is constant within 1e-4 of its largest
+value so far. If no momentum is written, the contact energy must be constant instead. A flight is detected once this has
+lasted for the waiting time, because a force that ends may act again: a car hit a block twice within 14 ms
+(docs/reference/first-run.md).
 
-The end of a push that dies away moves the start of the flight a little later as the flight goes on.  A contact moves it
-past the middle of the flight.  Without gravity, the end of a push may look like damping, so the force-free time may
-begin in it.  The flight then begins once the momentum itself is constant.
+As a flight goes on, a fading force may shift the detected start of the flight to slightly later times, whereas a
+contact would shift it beyond the middle of the flight. Without gravity, the end of a force may look like damping, so
+the force-free time may begin before this end. The flight then begins when the momentum itself is constant.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.names import Part
     from d2rpick.running.inner_motion import Wait
 
-    # Returns the gravity between two states, None if another force acts or a support holds parts.
+    # Returns the acceleration due to gravity between two states, or None if another force acts or parts are supported.
     FindGravity = Callable[["GrowingWitness", int, int], float | None]
 
 # Changes of a momentum or contact energy up to this fraction of its largest value so far are treated as zero [-].
@@ -47,23 +48,23 @@ class SeenFlight(NamedTuple):
     Attributes
     ----------
     start : float
-        Start of the force-free time, as known at ``seen`` [time].
+        Start of the force-free time as determined at ``seen`` [time].
     seen : float
-        State at which the wait was over [time].
+        Time of the state at which the waiting time was over [time].
     end : float or None
-        First state at which a force acts [time]; None if the record ends before.
+        Time of the first state at which a force acts [time]; None if the record ends before.
     wait : Wait
-        Force-free time that showed the flight.
+        Waiting time, i.e. the force-free time after which the flight was detected.
     quantity : str
         The quantity that shows the flight: "momentum less gravity" or "contact energy".
     left : float
-        Change of the momentum or contact energy from ``start`` to ``seen``, as a share of the largest value so far [-].
+        Change of the momentum or contact energy from ``start`` to ``seen``, relative to the largest value so far [-].
     gravity : float
         Acceleration, as in `FreeFlight`.
     parts : tuple of Part or None
-        Parts that fly together; None means the whole model.
+        Parts that fly together; None stands for the whole model.
     level : float or None
-        Time at which the centre of mass is again as high as at ``start`` [time]; None if that was before ``seen``.
+        Time at which the centre of mass is again as high as at ``start`` [time]; None if this time is before ``seen``.
     """
 
     start: float
@@ -97,13 +98,13 @@ class GrowingWitness:
     time : array of float
         Times of the states, shape (n,) [time].
     members : tuple of int
-        Numbers in the momenta of the parts that fly together; empty if only the energy of the contacts is written.
+        Indices in the momenta of the parts that fly together; empty if only the contact energy is written.
     free : list of int
-        For each state, the first state of the force-free time that lasts up to it.
+        For each state, the index of the first state of the force-free time that lasts up to this state.
     flights : list of SeenFlight
         Flights so far.
     pauses : list of (float, float)
-        Start and end of each force-free time that ended before it was seen as a flight [time].
+        Start and end of each force-free time that ended before the waiting time was over [time].
     """
 
     def __init__(
@@ -130,7 +131,7 @@ class GrowingWitness:
     ) -> None:
         """Append states, and find the force-free time at each of them.
 
-        ``columns`` (k, 5) are time, contact energy (NaN where it is not used), and momentum.
+        ``columns`` (k, 5) contains the time, the contact energy (NaN where it is not used), and the momentum vector.
         """
         self.time, contact, *_ = self._columns.add(columns).T
         momentum = self._columns.rows[:, 2:]
@@ -190,7 +191,8 @@ class GrowingWitness:
     ) -> None:
         """Add the flights and the completed force-free times that the new states show.
 
-        ``find_wait`` returns the waiting time for a flight since a time from the states up to a later one, or None.
+        ``find_wait`` returns the waiting time for a flight that begins at one time, from the states up to a later time;
+        None if it is unknown.
         """
         time = self.time
         for state in range(self._examined_count, len(self.free)):
@@ -250,11 +252,10 @@ class GrowingWitness:
         """Return when the centre of mass is again as high as at ``first`` [time]; None if that is before ``last``."""
         begin, end = self._columns.rows[[first, last]]
         gained = end[2:] - begin[2:]
-        time_to_level = (
-            -2 * (end[0] - begin[0]) * (begin[2:] @ gained) / (gained @ gained)
-        )
-        level = float(begin[0] + time_to_level)
-        return level if level > end[0] else None
+        start, now = begin[0], end[0]
+        time_to_level = -2 * (now - start) * (begin[2:] @ gained) / (gained @ gained)
+        level = float(start + time_to_level)
+        return level if level > now else None
 
 
 def _set_tolerance(
@@ -262,7 +263,7 @@ def _set_tolerance(
 ) -> tuple[Samples, NDArray[np.bool_]]:
     """Return the tolerance of a sum of ``count`` values at each state, and whether it is small enough to show forces.
 
-    ``values`` (n,) are those of the sum.
+    ``values`` (n,) are the values of the sum.
     """
     largest = np.maximum.accumulate(np.abs(values))
     noise = count * precision.quanta(largest) / 2

@@ -6,27 +6,26 @@ and `model.model_at` decides which one can be relied on at a td:
 
 1. oscillator (`identify`, `fitting`, `modes`, `span`): E = E_pl + (q_0 + q)^2 with q = exp(-alpha t/2) (a cos omega t
    + b sin omega t), the published floating oscillator (`oscillator`), fitted by least squares in the longest window
-   around td in which it describes the record.  Systematic structure in the rest refuses it.
+   around td in which it describes the record. It is refused if its misfit is not noise.
 2. modal (`lines`, `refined_lines`, `midpoint`, `modal`, `modal_span`, `locked_lines`, `close_modes`): any number of
-   modes.  The energy halfway
-   between tr and td gives the product of both deformations, X = V(m) - H(m)/2 + C(m, tau)/2, and with it
-   R^2 = 1 + [V(tr) - 2 X]/U(td); H and C follow from the lines of the energy.  Doubts refuse a record or widen
-   the band of R.
-3. swings (`swings`): the energy comes down to its floor in each swing; each minimum is a zero of the deformation,
-   whatever the law of the spring.
-4. energy: no sign is known; times at which the energy has the level of td remain (`moments`).
+   modes. The energy halfway between tr and td gives the product of both deformations, X = V(m) - H(m)/2 + C(m, tau)/2,
+   and thereby R^2 = 1 + [V(tr) - 2 X]/U(td); H and C follow from the lines of the energy.  Doubts refuse a record or
+   widen the band of R.
+3. swings (`swings`): the energy returns to its lower envelope in each half cycle; each minimum is a zero of the
+   deformation, whatever the law of the spring.
+4. energy: no sign is known; the candidates are the times at which the energy equals that at td (`moments`).
 
-The modal model describes nearly every record.  The others stay because each is better somewhere (figures:
-docs/explanation/basis.md): the oscillator states R of one mode ten times as accurately, and can be given; counted
-swings know the direction for springs that stiffen and for friction, where lines are refused or wide.  Energies of
-several parts are added, since only their sum is the energy of a whole structure.
+The modal model describes nearly every record. The others are kept because each is better for some records (figures:
+docs/explanation/basis.md): the oscillator states R of a single mode ten times as accurately, and the user can give one;
+counted half cycles show the direction for stiffening springs and for friction, for which the lines are refused or have
+a wide band. The energies of several parts are added, since only their sum is the energy of a whole structure.
 
-Lines of the kinetic energy (`flight.vibrating`) confirm those of the internal energy, or replace them where plastic
-flow or a damper's work hides these.
+The lines of the kinetic energy (`flight.vibrating`) confirm those of the internal energy. They replace them if plastic
+flow or the work of a damper hides the lines of the internal energy.
 
-A further model is a class in a module of its own, its name in `SignedModel` and `MODELS`, and its finder in
-`find_models`.  It has the methods of a `Deformation`, ``time`` (n,), ``signed`` (True if it covers enough of the
-energy), what is known at a td, and words: what a choice rests on (``told``), what the kinetic share is (``kinetic``),
+To add a model, write a class in a module of its own, add its name to `SignedModel` and `MODELS`, and call its finder in
+`find_models`. The class has the methods of a `Deformation`, ``time`` (n,), ``signed`` (True if the model covers enough
+of the energy), and three texts: what a choice is based on (``told``), how the kinetic share was obtained (``kinetic``),
 and why a tr has no measures (``undescribed``).
 """
 
@@ -69,7 +68,7 @@ def find_models(
 ) -> dict[str, SignedModel]:
     """Search a ``flight`` for models of the energy, best model first, until a model gives the sign of the deformation.
 
-    Swings are counted in the flight from when the energy has ``settled``, which may be before it.
+    Half cycles are counted from the time at which the energy has ``settled`` [time], which may precede the flight.
     """
     from d2rpick.histories.samples import get_ends
 

@@ -1,9 +1,9 @@
-"""Tell two modes whose frequencies are so close that the record shows one line, by the mean energy.
+"""Detect two modes whose frequencies are so close that the record shows a single line, from the mean energy.
 
-The line of two close modes is as high as the sum of both only while they are in phase.  As they get out of phase it
-falls, and what it loses seems to be static energy that rises.  If no energy is static, the mean energy is the sum of
-the heights of all lines; under this condition the record shows both modes.  Heat may look the same, so the modes are
-only one of two interpretations.
+The line of two close modes is as high as the sum of both modes only while they are in phase. As they get out of phase,
+the line falls, and the energy that it loses looks like rising static energy. If no energy is static, the mean energy is
+the sum of the line heights of all modes; under this condition the record shows both modes. Heat may look the same, so
+the two modes are only one of two interpretations.
 """
 
 from __future__ import annotations
@@ -30,32 +30,35 @@ if TYPE_CHECKING:
 # _MOST_STATIC: largest seemingly static energy of a beat, relative to the sum of the heights of all lines [-].
 # _LEAST_CHANGE: smallest change of the seemingly static energy that shows a beat, relative to that energy [-].
 _MOST_STATIC, _LEAST_CHANGE = 1.0, 0.1
-# Number of the strongest lines, each of which may be that of two modes.
+# Number of the strongest lines that are tried as the line of two close modes.
 _STRONGEST: Final = 3
 # Two modes describe the record equally well if twice the logarithm of the likelihood falls by at most this [-].
 _AS_WELL: Final = 4.0
-# _MOST_STEPS: largest number of steps of the fit; ten are usual.
+# _MOST_STEPS: largest number of steps of the fit; 10 are usual.
 # _CONVERGED: the fit ends with a step that reduces the sum of squares by at most this fraction [-].
 _MOST_STEPS, _CONVERGED = 30, 1e-5
-# First, smallest and largest damping of a step (Levenberg and Marquardt) [-].
+# _DAMPING: damping of the first step of the Levenberg-Marquardt method, relative to the scaled normal matrix [-].
+# _LEAST_DAMPING: smallest damping of a step [-].
+# _MOST_DAMPING: the fit ends if steps with up to this damping do not reduce the misfit [-].
 _DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1e-3, 1e-9, 1e6
-# The difference of the ends of a fitted straight line has this multiple of the standard deviation of its mean [-].
+# Standard deviation of the rise of a fitted straight line over the record, per standard deviation of its mean [-].
 _OF_ENDS: Final = np.sqrt(12)
 
 
 def find_close_modes(grid: Grid, prediction: Prediction) -> Spectrum | None:
-    """Return a spectrum in which one line is that of two close modes, if the mean energy may show them; else None.
+    """Return a spectrum in which two close modes replace one line; None if the mean energy shows no such modes.
 
-    The mean of the result is the sum of the heights of its lines, so that no energy is static.
+    The mean of the spectrum is the sum of the heights of its lines, because no energy is static.
     """
     spectrum = prediction.spectrum
-    # Without noise, the lines of close modes are found by themselves.
+    # Without noise, the fit of the lines resolves close modes, so they need not be searched for.
     is_noisy = spectrum.error > PERFECT * prediction.swing
     if not (is_noisy and _is_static_like_beat(grid, spectrum)):
         return None
     fits = [_fit_lines(grid, lines) for lines in _divide_lines(grid, spectrum)]
     close_modes = min(fits, key=lambda fit: fit.error)
-    lost = 2 * grid.time.size * np.log(close_modes.error / spectrum.error)
+    increase = close_modes.error / spectrum.error
+    lost = 2 * grid.time.size * np.log(increase)
     return close_modes if lost <= _AS_WELL else None
 
 
@@ -65,7 +68,8 @@ def _is_static_like_beat(grid: Grid, spectrum: Spectrum) -> bool:
     heights, static = _compute_ends(grid, spectrum)
     scatter = spectrum.error * np.sqrt(2 * lines.poles.size / grid.time.size)
     least = ABOVE_SCATTER * _OF_ENDS * scatter
-    of_heights, of_static = (float(ends[1] - ends[0]) for ends in (heights, static))
+    of_heights = float(heights[1] - heights[0])
+    of_static = float(static[1] - static[0])
     is_seen = min(abs(of_heights), abs(of_static)) > least
     is_changing = abs(of_static) > _LEAST_CHANGE * static.max()
     is_static = static > -least
@@ -92,9 +96,9 @@ def _sum_heights(lines: Exponentials) -> Exponentials:
 
 
 def _divide_lines(grid: Grid, spectrum: Spectrum) -> Iterator[Exponentials]:
-    """Yield the lines with one of the strongest divided into two of equal height, which beat as the mean demands.
+    """Yield the lines with one of the strongest lines divided into two equally high lines whose beat explains the mean.
 
-    Two lines of the height h whose phases are 2 p apart add up to 2 h cos(p), while their mean energy is 2 h.
+    Two lines of height h whose phases differ by 2 p form a line of height 2 h cos(p), whereas their mean energy is 2 h.
     """
     lines = spectrum.lines
     since_origin = grid.time[[0, -1]] - lines.origin
@@ -107,14 +111,15 @@ def _divide_lines(grid: Grid, spectrum: Spectrum) -> Iterator[Exponentials]:
         half_phases = np.arccos(height / together)
         growth = np.log(together[1] / together[0]) / grid.span
         half = weight * together[0] / (2 * height[0])
-        others = np.arange(lines.poles.size) != line
+        is_other = np.arange(lines.poles.size) != line
+        other_poles, other_weights = lines.poles[is_other], lines.weights[is_other]
         for first_phase in (half_phases[0], -half_phases[0]):
             apart = (half_phases[1] - first_phase) / grid.span
             poles = growth + 1j * (pole.imag + sides * apart)
             weights = half * np.exp(1j * sides * first_phase)
             yield Exponentials(
-                np.concatenate([lines.poles[others], poles]),
-                np.concatenate([lines.weights[others], weights]),
+                np.concatenate([other_poles, poles]),
+                np.concatenate([other_weights, weights]),
                 lines.origin,
             )
 
@@ -143,9 +148,9 @@ def _build_normal_equations(
     """Return the scale of each parameter, shape (4 k,), and with it the normal matrix and the gradient of the fit."""
     lines = spectrum.lines
     averaged = spectrum.average_blocks(grid).lines
-    design = averaged.differentiate(grid.time) + _differentiate_heights(
-        lines, grid.time
-    )
+    of_lines = averaged.differentiate(grid.time)
+    of_mean = _differentiate_heights(lines, grid.time)
+    design = of_lines + of_mean
     scale = np.maximum(np.linalg.norm(design, axis=0), 1e-300)
     design /= scale
     return scale, design.T @ design, design.T @ spectrum.rest
@@ -167,23 +172,17 @@ def _differentiate_heights(lines: Exponentials, times: Samples) -> Samples:
 
 
 def _move_lines(grid: Grid, lines: Exponentials, step: Samples) -> Spectrum:
-    """Return the spectrum of the lines after a step of their parameters, shape (4 k,).
+    """Return the spectrum of the lines after a ``step`` (4 k,) of their parameters.
 
-    The lines grow and decay no faster than lines of modes may, because a longer step could overflow.
+    The growth and the decay of the lines are limited to those of modes, because a longer step could overflow.
     """
     of_weights, of_poles = step.reshape(2, 2, -1)
-    growth = np.clip(
-        lines.poles.real + of_poles[0],
-        -MOST_DECAY / grid.span,
-        MOST_GROWTH / grid.span,
-    )
-    return _fill_mean(
-        grid,
-        lines._replace(
-            weights=lines.weights + of_weights[0] + 1j * of_weights[1],
-            poles=growth + 1j * (lines.poles.imag + of_poles[1]),
-        ),
-    )
+    lowest, highest = -MOST_DECAY / grid.span, MOST_GROWTH / grid.span
+    growth = np.clip(lines.poles.real + of_poles[0], lowest, highest)
+    rate = lines.poles.imag + of_poles[1]
+    weights = lines.weights + of_weights[0] + 1j * of_weights[1]
+    moved = lines._replace(weights=weights, poles=growth + 1j * rate)
+    return _fill_mean(grid, moved)
 
 
 def _fill_mean(grid: Grid, lines: Exponentials) -> Spectrum:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from d2rpick.vibration.locked_lines import StretchLine
     from d2rpick.vibration.midpoint import Reading
 
-# Number of values of tr and of td at which the overlap of the deformations is compared with its bounds.
+# Number of values of tr and of td at which the correlation of the deformations is checked against its bounds.
 _CHECKED: Final = 90
 
 # Largest prediction error of an accepted record, relative to the range of the energy [-].
@@ -41,9 +41,11 @@ _FEWEST_PER_PERIOD: Final = 2.4
 class Doubts(NamedTuple):
     """Signs that a record does not come from a linear structure in free flight; 0 means no doubt [-].
 
-    ``missed`` and ``misfit`` are relative to the swing of the energy, ``negative``, ``drift`` and ``unstretched`` to
-    the mean vibration energy, ``beyond`` to the vibration energy; ``harmonic`` is the size of lines locked to a first
-    one, relative to it; ``coarse`` is the number of states per period of the fastest strong line.
+    ``missed`` (prediction error) and ``misfit`` are relative to the range of the energy. ``negative`` and ``drift`` (of
+    the static energy) and ``unstretched`` (static energy that static deformations lack) are relative to the mean
+    vibration energy. ``beyond`` is by how much the overlap exceeds its bounds, relative to the vibration energy.
+    ``harmonic`` is the height of the harmonics relative to their fundamental line. ``coarse`` is the number of states
+    per period of the highest-frequency strong line.
     """
 
     missed: float
@@ -101,8 +103,8 @@ class Doubts(NamedTuple):
 class StaticEnergy(NamedTuple):
     """Static part of the mean energy.
 
-    ``energy`` (n,) is its course at the times of the grid [energy], ``mean`` the mean elastic energy of the modes
-    [energy], and ``share`` the mean static energy relative to it [-].
+    ``energy`` (n,) is the static energy at the times of the grid [energy]. ``mean`` is the mean elastic energy of the
+    modes [energy], and ``share`` the mean static energy divided by ``mean`` [-].
     """
 
     energy: Samples
@@ -140,13 +142,18 @@ def measure_doubts(
 
 def _measure_beyond_bounds(reading: Reading, grid: Grid) -> float:
     """Return how far the overlap exceeds its bounds (rms over pairs of times), relative to the vibration energy [-]."""
-    # Even times: the middle between any two is one of them or lies between neighbours.
+    # The times are evenly spaced, so the middle of any two is one of them or lies halfway between neighbours.
     even = np.linspace(grid.time[0], grid.time[-1], 2 * _CHECKED - 1)
     tr, td = np.triu_indices(_CHECKED, 1)
     middle = tr + td
-    elastic, level = reading.elastic_energy(even), reading.level(even)
+    elastic = reading.elastic_energy(even)
+    level = reading.level(even)
+    ends = even[::2]
     at_ends = np.maximum(elastic[::2], 0.0)
-    coherence = (reading.earlier(even[::2]) @ reading.later(even[::2]).T).real
-    overlap = (elastic - level / 2)[middle] + coherence[tr, td] / 2
-    beyond = np.maximum(np.abs(overlap) - np.sqrt(at_ends[tr] * at_ends[td]), 0.0)
-    return float(np.sqrt(np.mean((beyond / level[middle]) ** 2)))
+    bound = np.sqrt(at_ends[tr] * at_ends[td])
+    coherence = (reading.earlier(ends) @ reading.later(ends).T).real
+    fluctuation = (elastic - level / 2)[middle]
+    overlap = fluctuation + coherence[tr, td] / 2
+    beyond = np.maximum(np.abs(overlap) - bound, 0.0)
+    relative = beyond / level[middle]
+    return float(np.sqrt(np.mean(relative**2)))

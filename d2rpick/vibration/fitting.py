@@ -1,11 +1,11 @@
 """Fit the energy of one vibration mode to samples by least squares; no initial guess is required.
 
-Everything here is scaled: s in [0, 1] over the record, energies in units of the record's range.  A parameter
-vector is (omega, alpha, cosine, sine, energy_plastic, preload) of
+All quantities are scaled: the time s runs from 0 to 1 over the record, and energies are in units of the record's range.
+A parameter vector is (omega, alpha, cosine, sine, energy_plastic, preload) of
 
     E(s) = energy_plastic + q**2,  q = preload + exp(-alpha s/2) (cosine cos(omega s) + sine sin(omega s)).
 
-What a fit leaves over may be white noise; structure that neighbouring samples share must be small.
+The misfit may be white noise; its structure, i.e. the part that neighbouring samples share, must be small.
 """
 
 from __future__ import annotations
@@ -83,7 +83,8 @@ def fit_few(
 
     The first ``size`` parameters are free, the others zero.
 
-    None if the fit leaves more than ``worst`` of the variance or, if ``worst`` is finite, too much structure.
+    The result is None if the fit leaves more than the fraction ``worst`` of the variance. It is also None if ``worst``
+    is finite and the misfit has too much structure.
     """
     few_states = _take_few(s, e)
     model = partial(compute_energy_and_jacobian, size=size)
@@ -119,9 +120,9 @@ def fit_all(
 ) -> Samples | None:
     """Return the best fit to all samples, starting from the ``best`` fit to a selection of them.
 
-    None if there is no start, or if ``worst`` is finite and some of the samples are left with too much structure.  A
-    fit that leaves far too much is not refined for all samples, nor is a drift: both will be refused and would converge
-    slowly.
+    The result is None if ``best`` is None, or if ``worst`` is finite and the misfit of some of the samples has too much
+    structure. Fits with far too large a misfit, and drifts, are not refined for all samples: they will be refused and
+    would converge slowly.
     """
     if best is None or s.size <= COARSE:
         return best
@@ -171,9 +172,9 @@ def _is_structured(parameters: Samples, model: Model, s: Samples, e: Samples) ->
 class Pencil(NamedTuple):
     """Signal subspace of the exponentials in the energy: singular vectors of its Hankel matrix, shape (lags, lags).
 
-    Matrix pencil (Hua and Sarkar, IEEE Trans.  ASSP 38, 1990): the leading right singular vectors of the Hankel matrix
-    of equidistant values span the exponentials, and a shift by one cell multiplies each by exp(p h).  Means of an
-    exponential over cells are the same exponential, so that cells also serve dense records.
+    Matrix pencil (Hua and Sarkar, IEEE Trans. ASSP 38, 1990): the leading right singular vectors of the Hankel matrix
+    of equidistant values span the exponentials, and a shift by one cell multiplies each exponential by exp(p h). The
+    means of an exponential over cells form an exponential with the same p, so dense records can be averaged over cells.
     """
 
     vectors: Samples
@@ -200,9 +201,9 @@ class Pencil(NamedTuple):
     def rates(self, orders: tuple[int, ...] = _ORDERS) -> NDArray[np.complex128]:
         """Return the complex exponents p of the oscillating terms exp(p s) that the energy may contain.
 
-        The real part of p is minus the damping, the imaginary part is the positive frequency.
+        The real part of p is the negative damping rate, and its imaginary part the positive angular frequency.
 
-        ``orders`` are the numbers of exponentials to try.
+        ``orders`` lists the numbers of exponentials to try.
         """
         z = np.concatenate([find_factors(self.vectors[:, :order]) for order in orders])
         return np.asarray(np.log(z[z.imag > 0]) * self.cells)
@@ -211,7 +212,7 @@ class Pencil(NamedTuple):
 def find_factors(vectors: Samples) -> NDArray[np.complex128]:
     """Return the factors z of exponentials z**k whose windows over k are spanned by ``vectors`` (n, order).
 
-    A shift by one maps the space of the windows to itself; the factors are the eigenvalues.
+    A shift by one value maps the space of the windows onto itself; its eigenvalues are the factors.
     """
     shift = np.linalg.lstsq(vectors[:-1], vectors[1:], rcond=None)[0]
     return np.linalg.eigvals(shift).astype(np.complex128)
@@ -229,9 +230,9 @@ def _find_starts(
 ) -> list[Samples]:
     """Return the best parameter vectors to start a fit from, for a model with ``size`` free parameters.
 
-    A rate p is that of q**2 (alpha = -Re p, omega = Im p / 2) or, with a preload, that of q (alpha = -2 Re p, omega =
-    Im p).  For given rates E is linear in products of the other parameters, and their fit ranks the rates and gives the
-    parameters.
+    A rate p belongs to q**2 (alpha = -Re p, omega = Im p / 2) or, with a preload, to q (alpha = -2 Re p, omega = Im p).
+    For given rates, E is linear in products of the other parameters. A linear fit of these products ranks the rates and
+    gives the parameters.
     """
     omega = poles.imag / 2
     alpha = -poles.real
@@ -295,9 +296,9 @@ def refine_parameters(
 ) -> tuple[Samples, float]:
     """Refine parameters by the Levenberg-Marquardt method; return them and the sum of squares.
 
-    Parameters without derivatives are kept.  The iteration ends if a step gains less than ``near`` of the sum of
-    squares; it ends early if such steps cannot reach ``hopeless``, or after more steps than usual if the end is
-    ``doomed``.
+    Parameters without derivatives are kept. The iteration ends if a step reduces the sum of squares by less than the
+    fraction ``near``. It ends early if such steps cannot reach the sum ``hopeless``, or after more steps than usual if
+    the fit is ``doomed`` to be refused.
     """
     # The damping of the Levenberg-Marquardt method is small, because the starting values are good.
     damping = 1e-4
@@ -359,14 +360,17 @@ def compute_covariance(normal: Samples, rest: Samples) -> Samples:
     norm = np.sqrt(normal.diagonal())
     norm[norm < _NO_EFFECT] = 1.0
     scale = norm * norm[:, None]
-    variance = float(rest @ rest) / (rest.size - norm.size)
-    return np.asarray(variance * np.linalg.pinv(normal / scale, hermitian=True) / scale)
+    freedom = rest.size - norm.size
+    variance = float(rest @ rest) / freedom
+    inverse = np.linalg.pinv(normal / scale, hermitian=True)
+    return np.asarray(variance * inverse / scale)
 
 
 def measure_structure(rest: Samples, deviations: float = _DEVIATIONS) -> float:
     """Return the rms of the part of ``rest`` that neighbouring values share, beyond the part due to white noise.
 
-    The larger value of lags 1 and 2: a vibration sampled four times per period shows only at lag 2.
+    The larger of the values for lags 1 and 2 is returned: a vibration sampled four times per period shows only at lag
+    2.
     """
 
     def excess(products: Samples) -> float:
@@ -382,7 +386,7 @@ def measure_structure(rest: Samples, deviations: float = _DEVIATIONS) -> float:
 def has_clear_structure(rest: Samples, spread: float) -> bool:
     """Return True if the structure of the misfit on evenly spaced samples suffices to refuse a fit to all samples.
 
-    ``spread`` is the standard deviation of the energy there.
+    ``spread`` is the standard deviation of the energy at these samples [energy].
     """
     return (
         measure_structure(rest, _BEYOND_DOUBT)

@@ -6,16 +6,16 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from d2rpick.vibration.line_scatter import MOST_SHARED
 from d2rpick.vibration.locked_lines import ABOVE_SCATTER
 
 if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
 
-# Largest relative variation of a level that is treated as constant [-]; single precision resolves no less.
-_RESOLVED: Final = 2e-7
-# _LIKE_LEVEL: largest fraction of the variation of a static energy that does not follow the level [-].
-# _MOST_SHARED: upper limit of the correlation of neighbouring misfits [-], so that some states remain independent.
-_LIKE_LEVEL, _MOST_SHARED = 0.3, 0.9
+# Relative variations up to this are treated as zero [-], because single precision does not resolve them.
+RESOLVED: Final = 2e-7
+# Largest fraction of the variation of a static energy that does not follow the level [-].
+_LIKE_LEVEL: Final = 0.3
 # Assumed number of lines that are hidden in the misfit.
 _HIDDEN_LINES: Final = 12
 
@@ -26,7 +26,7 @@ def measure_hidden_pairs(
     """Return the vibration energy that shows no lines but decays like the ``level``, relative to the level [-].
 
     The lines of two modes with equal frequencies and opposite phases cancel each other, so their energy looks static.
-    But static energy stays as it is, while that of modes decays with all others.
+    But static energy is constant, whereas the energy of these modes decays like that of all others.
 
     Parameters
     ----------
@@ -39,11 +39,11 @@ def measure_hidden_pairs(
     """
     fallen = level - np.mean(level)
     variance = float(np.mean(fallen**2))
-    if variance <= (_RESOLVED * float(np.mean(level))) ** 2:
+    if variance <= (RESOLVED * float(np.mean(level))) ** 2:
         return 0.0
     share = float(np.mean(fallen * static)) / variance
     left = static - np.mean(static) - share * fallen
-    shared = min(systematic, _MOST_SHARED)
+    shared = min(systematic, MOST_SHARED)
     states = static.size * (1 - shared) / (1 + shared)
     scatter = noise / np.sqrt(states * variance)
     is_seen = share > ABOVE_SCATTER * scatter
@@ -55,7 +55,8 @@ def measure_hidden_pairs(
 def find_most_hidden(rest: Samples) -> float:
     """Return the largest vibration energy that lines hidden in the misfit (n,) of a fit could have [energy].
 
-    None of them is higher than the highest line of the rest, and together they are no more than the rest.
+    No hidden line is higher than the highest line of the misfit, and the power of all of them is at most that of the
+    misfit.
     """
     highest = 2 * float(np.abs(np.fft.rfft(rest)).max()) / rest.size
     most_together = np.sqrt(2 * np.mean(rest**2) / _HIDDEN_LINES)

@@ -58,27 +58,28 @@ class Identification(NamedTuple):
     describes_record : bool
         True when the fit was accepted.
     reason : str or None
-        Why the fit was refused.
+        Reason why the fit was refused; None if it was accepted.
     misfit : float or None
         rms(E - fit) / std(E) over the window [-].
     rms : float
-        rms(E - fit) [energy]; NaN if there is no mode, as is ``structure``.
+        rms(E - fit) [energy]; NaN if there is no mode.
     structure : float
-        The part of ``rms`` that neighbouring samples share and white noise does not leave [energy].
+        Part of ``rms`` that neighbouring samples share, beyond that of white noise [energy]; NaN if there is no mode.
     start, end : float
         Window of the fit [time].
     covariance : array of shape (p, p)
-        Of the parameters in the order of ``mode.energy_gradient``, for independent errors of the samples.
+        Covariance of the parameters in the order of ``mode.energy_gradient``, for independent errors of the samples.
     vibration : float
         Root mean square of the vibration energy over the window [energy]; NaN if there is no mode.
     hidden_share : float
         Fraction of the vibration energy that a hidden further mode may have [-]; zero if no further mode was tested.
     deviation_times, deviations : array of shape (d,)
-        How far the energy is off the fit at some times, beyond noise [time], [energy]; empty if it was not measured.
+        Some times [time], and by how much the energy near them deviates from the fit beyond noise [energy]; empty if
+        not measured.
     follows : bool
-        Whether the fit follows the samples, plausible or not.
+        True if the fit follows the samples, whether or not it is plausible.
     plausible : bool
-        Whether it would be one free vibration, if it followed them.
+        True if the fitted parameters are those of a free vibration, whether or not the fit follows the samples.
     """
 
     mode: Mode | None
@@ -100,7 +101,7 @@ class Identification(NamedTuple):
     def energy_deviation(self, times: Samples | float) -> Samples:
         """Return the standard deviation of the fitted energy at ``times`` [energy]; NaN if there is no mode.
 
-        To first order in the errors of the parameters, the root of the diagonal of J C J^T.
+        It is computed to first order in the parameter errors, as the root of the diagonal of J C J^T.
         """
         t = np.atleast_1d(np.asarray(times, dtype=np.float64))
         if self.mode is None:
@@ -124,21 +125,21 @@ def identify(
     time : array of shape (n,)
         Strictly increasing, equidistant or not [time].
     energy : array of shape (n,)
-        Internal energy; may be zero or negative, as some solvers write it [energy].
+        Internal energy [energy]; it may be zero or negative, because some solvers write such values.
     quick : bool
-        Refuse where a few samples show that no model follows, without the best fit to all of them and its misfit.
+        Refuse the record as soon as a few samples show that no model follows it; no fit to all samples is then made.
     rates : array of shape (k,), optional
         The result of `find_rates` for these samples, if it is known.
 
     Returns
     -------
     Identification
-        With its reason where no model describes the record; nothing is raised.
+        The accepted fit, or the reason why no model describes the record; no error is raised.
 
     Notes
     -----
     The energy is that of equations (1) and (7) of "Analysis of switched-rigid floating oscillator" (Shock and
-    Vibration), E = k (y - z)**2 / 2, extended by plastic work and a preload.  Overdamped motion shows no rate
+    Vibration), E = k (y - z)**2 / 2, extended by plastic work and a preload. Overdamped motion has no oscillation rate
     and cannot be identified.
 
     Examples
@@ -193,7 +194,7 @@ def _fit_models(
 def find_rates(time: Samples, energy: Samples) -> NDArray[np.complex128]:
     """Return the complex exponents of the exponentials that E may contain, times the record length, shape (k,).
 
-    A record that is too short to be judged has none.
+    The result is empty if the record is too short to be judged.
     """
     if _refuse_short_record(time, energy):
         return np.zeros(0, np.complex128)
@@ -206,7 +207,7 @@ def _choose_first_to_follow(
 ) -> Identification:
     """Judge the fits, simplest model first; return the first fit that follows the samples, otherwise the best fit.
 
-    If a fit follows the samples, a richer one would follow them as well and be no more plausible.
+    If a fit follows the samples, a model with more parameters would follow them too, without being more plausible.
     """
     refused: list[Identification] = []
     for attempt, least_periods in attempts:
@@ -225,9 +226,10 @@ def _prefer_through_zero(
 ) -> Identification:
     """Replace a vibration about a preload with one through zero at half the frequency, if both fit almost equally well.
 
-    The energy swings once in a period of the one, twice in that of the other: from one swing to the next their signs
-    differ.  What tells them apart is then as small as what a spring that stiffens adds.  If it is a preload after all,
-    residuals are twice as large, which counts like a hidden mode.
+    The energy has one cycle per period of the vibration with a preload, but two per period of the one through zero,
+    whose sign changes from one cycle to the next. If both fit almost equally well, their difference is as small as the
+    effect of a stiffening spring. If there is a preload after all, the residuals are twice as large; this is treated
+    like a hidden mode.
     """
     mode = found.mode
     near = [
@@ -259,7 +261,7 @@ def judge_given(
 ) -> Identification:
     """Compare a given mode with a record. The mode must follow the samples as closely as a fitted mode.
 
-    Parameters and result as for ``identify``; the mode stays as it is and has no scatter.
+    The parameters and the result are those of ``identify``; the mode is not changed and has no covariance.
     """
     if lacking := _refuse_short_record(time, energy):
         return lacking
@@ -420,8 +422,8 @@ def _explain_misfit(
 def count_samples_per_period(time: Samples, mode: Mode) -> float:
     """Return the number of samples per energy period of the highest-frequency mode, with four digits.
 
-    The energy has two periods per vibration period.  A record is often written with a round number of states per
-    period: rounding of its times, as in single precision, must not decide whether they are enough.
+    The energy has two periods per vibration period. The result is rounded because records often have a round number of
+    states per period, and times rounded to single precision must not decide whether this number suffices.
     """
     # Each interval is weighted by its length, so that gaps have more effect.
     interval = float(np.sum(np.diff(time) ** 2)) / float(time[-1] - time[0])
@@ -458,7 +460,17 @@ def _make_mode(parameters: Samples, origin: float) -> Mode:
 
 def _refuse_without_fit(time: Samples, reason: str) -> Identification:
     """Return the result that refuses a record to which nothing was fitted."""
-    start, end = (float(time[0]), float(time[-1])) if time.size else (np.nan, np.nan)
+    start = end = np.nan
+    if time.size:
+        start, end = float(time[0]), float(time[-1])
     return Identification(
-        None, False, reason, None, np.nan, np.nan, start, end, np.zeros((0, 0))
+        mode=None,
+        describes_record=False,
+        reason=reason,
+        misfit=None,
+        rms=np.nan,
+        structure=np.nan,
+        start=start,
+        end=end,
+        covariance=np.zeros((0, 0)),
     )

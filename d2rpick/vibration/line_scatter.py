@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from d2rpick.vibration.midpoint import Reading
 
 # Upper limit of the correlation of neighbouring misfits [-], so that some of the states remain independent.
-_MOST_SHARED: Final = 0.9
+MOST_SHARED: Final = 0.9
 # Prior standard deviation of the frequency of a line, in cycles over the record [-].
 # The prior limits the uncertainty of spurious lines that are fitted to noise.
 _LOOSE_TURNS: Final = 0.5
@@ -29,7 +29,7 @@ _LOOSE_TURNS: Final = 0.5
 class LineScatter:
     """Standard deviation of the squared residual for one interpretation ``reading`` of the lines on a ``grid``.
 
-    Neighbouring states have the share ``systematic`` of the misfit in common [-].
+    ``systematic`` is the fraction of the misfit that neighbouring states have in common [-].
     """
 
     reading: Reading
@@ -55,7 +55,7 @@ class LineScatter:
             [averaged.lines.differentiate(times), averaged.mean.waves(times).real]
         )
         freedom = max(times.size - design.shape[1], 1)
-        shared = min(self.systematic, _MOST_SHARED)
+        shared = min(self.systematic, MOST_SHARED)
         # The number of independent states follows from a first-order autoregressive model.
         variance = np.sum(spectrum.rest**2) / freedom * (1 + shared) / (1 - shared)
         if variance <= 0:
@@ -80,7 +80,7 @@ class LineScatter:
     def _compute_gradient(self, tr: Samples, td: Samples) -> Samples:
         """Return the derivatives of the squared residual by all parameters, shape (n, p) [1/energy, time/1].
 
-        R^2 = 1 + [V(tr) - 2 V(m) + H(m) - C(tr, td)] / H(td), the small change of U within a period left out.
+        R^2 = 1 + [V(tr) - 2 V(m) + H(m) - C(tr, td)] / H(td), which neglects the small change of U within a period.
         """
         reading = self.reading
         lines = reading.spectrum.lines

@@ -1,10 +1,10 @@
 """Find the spectral lines of an energy: its decaying exponentials, for which no initial guess is needed.
 
-The internal energy of a linear structure in free flight has one line for each mode, at twice the rate and twice the
-decay of the mode, above a mean that falls slowly.  The rates come from the shift invariance of the signal space
-(ESPRIT: Roy and Kailath, IEEE Trans. ASSP 37, 1989), the weights from least squares on these rates.  How many
-exponentials there are is decided by prediction: the first part of the record is fitted, and the rest shows which
-number of them goes on as the record does.
+The internal energy of a linear structure in free flight has one line for each mode, at twice the frequency and twice
+the decay rate of the mode, above a mean that falls slowly. The rates follow from the shift invariance of the signal
+subspace (ESPRIT: Roy and Kailath, IEEE Trans. ASSP 37, 1989), and the weights from a least-squares fit with these
+rates. The number of exponentials is decided by prediction: the first part of the record is fitted, and the number that
+predicts the rest best is used.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ _ABOVE_NOISE: Final = 20.0
 # _ALL_POWER: the lowest-frequency lines that together have this fraction of the power are treated as relevant [-].
 # _STRONG_POWER: the lowest-frequency lines that together have this fraction of the power are treated as strong [-].
 _ALL_POWER, _STRONG_POWER = 1 - 2e-5, 0.95
-# Length of the first part of the record that is searched for early decaying lines, as a fraction of the record [-].
+# Fraction of the record, from its start, that is searched for spectral lines that decay early [-].
 _EARLY: Final = 0.25
 # _LEAST_TURNS: smallest number of cycles of a line in the record.
 # _SURE_TURNS: a line with more than this number of cycles cannot be confused with slow changes of the mean.
@@ -64,8 +64,8 @@ _MOST_DECAYS, _SAME_DECAY = 4, 0.05
 class Grid(NamedTuple):
     """Means of an energy over blocks of equidistant states; ``time`` [time] and ``energy`` [energy] have shape (m,).
 
-    A block has ``size`` states at a distance of ``spacing`` [time].  ``strong`` is the number of grid points in a
-    period of the fastest strong line [-].
+    A block has ``size`` states whose output interval is ``spacing`` [time]. ``strong`` is the number of states per
+    period of the highest-frequency strong line [-].
     """
 
     time: Samples
@@ -91,7 +91,7 @@ class Grid(NamedTuple):
     def waves(self, poles: Complex) -> Complex:
         """Return exp(p (t - t_0)) at the m times t of the grid, where t_0 is the first time; shape (m, poles) [-].
 
-        On an even grid each value is a product of two from about 2 sqrt(m) exponentials, which is faster to compute.
+        On an even grid, each value is the product of two of about 2 sqrt(m) exponentials, which saves computing time.
         """
         count = self.time.size
         width = ceil(sqrt(count))
@@ -116,7 +116,7 @@ def make_even_grid(time: Samples, energy: Samples) -> Grid:
     Parameters
     ----------
     time, energy : array of shape (n,)
-        Ascending, at least 4 of them [time], [energy].
+        At least 4 states with ascending times [time], [energy].
     """
     even = np.linspace(time[0], time[-1], time.size)
     values = energy
@@ -149,15 +149,15 @@ def make_even_grid(time: Samples, energy: Samples) -> Grid:
 
 def _count_turns(time: Samples, values: Samples) -> tuple[float, float]:
     """Return the numbers of cycles that the highest relevant and highest strong frequencies complete in times (n,)."""
-    reach = time - time[0]
-    trend = np.polyval(np.polyfit(reach, values, 2), reach)
-    power = np.abs(np.fft.rfft((values - trend) * np.hanning(time.size))) ** 2
+    since_start = time - time[0]
+    trend = np.polyval(np.polyfit(since_start, values, 2), since_start)
+    tapered = (values - trend) * np.hanning(time.size)
+    power = np.abs(np.fft.rfft(tapered)) ** 2
     # White noise has the same power at all frequencies, so the highest frequencies show the noise level.
     noise = _ABOVE_NOISE * float(compute_median(power[power.size // 2 :]))
     running = np.cumsum(np.maximum(power - noise, 0.0))
-    fastest, strongest = np.searchsorted(
-        running, np.array([_ALL_POWER, _STRONG_POWER]) * running[-1]
-    ).tolist()
+    limits = np.array([_ALL_POWER, _STRONG_POWER]) * running[-1]
+    fastest, strongest = np.searchsorted(running, limits).tolist()
     return fastest, strongest
 
 
@@ -166,7 +166,7 @@ class Exponentials(NamedTuple):
 
     .. math:: f(t) = \mathrm{Re} \sum_k w_k e^{p_k (t - t_0)}
 
-    ``poles`` p and ``weights`` w of shape (k,), the imaginary parts of the poles not negative [1/time], [energy];
+    ``poles`` p [1/time] and ``weights`` w [energy] have shape (k,); the imaginary parts of the poles are not negative.
     ``origin`` is t_0 [time].
     """
 
@@ -187,7 +187,7 @@ class Exponentials(NamedTuple):
     def differentiate(self, times: Samples) -> Samples:
         """Return the derivatives of the sum at times (n,) with respect to its 4 k parameters, shape (n, 4 k).
 
-        The parameters are the real and imaginary parts of the weights, then those of the poles.
+        The parameters are the real parts of all weights, their imaginary parts, then the same for the poles.
         """
         courses = self.waves(times)
         moved = courses * self.weights * (times - self.origin)[:, np.newaxis]
@@ -249,8 +249,8 @@ class Spectrum(NamedTuple):
 class Prediction(NamedTuple):
     """The ``spectrum`` of a grid, the spectrum of the grid's first part, and its error in predicting the rest.
 
-    ``missed`` is the root mean square deviation from the first part's spectrum, over the whole grid, relative to
-    ``swing`` [-]; ``swing`` is the standard deviation of the energy about its trend [energy].
+    ``missed`` is the rms deviation of the whole grid from the spectrum of the first part, relative to ``swing`` [-].
+    ``swing`` is the standard deviation of the energy about its trend [energy].
     """
 
     spectrum: Spectrum
@@ -335,11 +335,11 @@ class _SignalSpace:
     def poles(self, order: int) -> Complex:
         """Return the poles of ``order`` exponentials [1/time], from the shift invariance of the subspace (ESPRIT)."""
         leading = self.vectors[:, :order]
-        factors = np.linalg.eigvals(
-            np.linalg.lstsq(leading[:-1], leading[1:], rcond=None)[0]
-        )
+        shift = np.linalg.lstsq(leading[:-1], leading[1:], rcond=None)[0]
+        factors = np.linalg.eigvals(shift)
         is_usable = np.isfinite(factors) & (np.abs(factors) > 1e-6)
-        return np.asarray(np.log(factors[is_usable].astype(np.complex128)) / self.step)
+        usable_factors = factors[is_usable].astype(np.complex128)
+        return np.asarray(np.log(usable_factors) / self.step)
 
 
 def fit_spectrum(
@@ -347,9 +347,10 @@ def fit_spectrum(
 ) -> Spectrum:
     """Fit lines and a mean with the given poles to a grid.
 
-    Decays that cannot be distinguished within ``span`` are merged.
+    Decays that cannot be distinguished within ``span`` [time] are merged.
 
-    If ``every_decay`` is True, the mean contains the decay of each line, which noise permits only for few lines.
+    If ``every_decay`` is True, the mean also contains the decay of each line; with noise, this works only for few
+    lines.
     """
     return fit_weights(grid, *_split(poles, span, every_decay=every_decay))
 
@@ -414,5 +415,6 @@ def _few_of(decays: Samples, span: float) -> Samples:
     rounded = sorted(set(np.round(decays * span, 1).tolist()))
     few = np.array([decay for decay in rounded if abs(decay) > _SAME_DECAY])
     if few.size > _MOST_DECAYS:
-        few = few[np.linspace(0, few.size - 1, _MOST_DECAYS).round().astype(int)]
+        spread = np.linspace(0, few.size - 1, _MOST_DECAYS)
+        few = few[spread.round().astype(int)]
     return few / span

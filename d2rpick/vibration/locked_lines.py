@@ -40,8 +40,9 @@ _STRONGEST, _HARMONICS = 3, (2, 3, 4, 5)
 class StretchLine(NamedTuple):
     """The ``line`` that arises because the mode of the line ``of_mode`` vibrates about a static deformation.
 
-    ``swings`` is True if the stretch swings about its mean; the energy is then the mean of what swings, in two lines.
-    ``is_exact`` is False if the rates differ by more than scatter can make them: a solver's structure, or two modes.
+    ``energy`` is the mean energy of the static deformation [energy]. ``swings`` is True if this deformation oscillates
+    slowly about its mean; it then causes two lines, which share its mean energy. ``is_exact`` is False if the frequency
+    of the line differs from half the frequency of the mode's own line by more than scatter explains.
     """
 
     line: int
@@ -56,32 +57,32 @@ def find_stretches(
 ) -> tuple[StretchLine, ...]:
     """Find the lines of modes that vibrate about a static deformation, as in a rotating body.
 
-    A mode q about q0 has the energy q0^2 + 2 q0 q + q^2: a further line at half the rate and half the phase of its own.
-    In free flight of a body that does not spin, the energy is stationary at rest, whatever the residual stress, and has
-    no such line. A stretch that swings itself, as that of a part on a hinge, has two such lines, one on each side.
+    A mode q about q0 has the energy q0^2 + 2 q0 q + q^2, i.e. a further line with half the frequency and half the phase
+    of the mode's own line. In free flight of a body that does not spin, the elastic energy is stationary at equilibrium
+    despite residual stresses, so there is no such line. A static deformation that oscillates slowly, like that of a
+    part on a hinge, causes two such lines, one on each side.
     """
     size = np.abs(lines.weights)
     rate = lines.poles.imag
     phase = _find_phases_in_middle(lines, span)
     strongest = float(size.max(initial=0.0))
+    least = max(NOTABLE * strongest, ABOVE_SCATTER * scatter)
+    least_partner = max(_NOTABLE_PARTNER * strongest, ABOVE_SCATTER * scatter)
     order = np.argsort(-size).tolist()
     stretches: list[StretchLine] = []
     for line in order:
-        if size[line] < max(NOTABLE * strongest, ABOVE_SCATTER * scatter):
+        if size[line] < least:
             continue
         for own_line in order:
-            if own_line == line or size[own_line] < max(
-                _NOTABLE_PARTNER * strongest, ABOVE_SCATTER * scatter
-            ):
+            if own_line == line or size[own_line] < least_partner:
                 continue
-            unsure = 3 * min(scatter / size[own_line] + 2 * scatter / size[line], 0.1)
+            phase_error = scatter / size[own_line] + 2 * scatter / size[line]
+            unsure = 3 * min(phase_error, 0.1)
             apart = abs(rate[own_line] - 2 * rate[line]) * span
             if apart > 2 * np.pi * _SAME_RATE:
                 continue
-            if (
-                abs(_wrap(phase[own_line] - 2 * phase[line], 2 * np.pi))
-                < _SAME_PHASE + unsure
-            ):
+            turned = phase[own_line] - 2 * phase[line]
+            if abs(_wrap(turned, 2 * np.pi)) < _SAME_PHASE + unsure:
                 # In a fit, the error of an angular frequency times the record length is sqrt(12) times that of a phase.
                 is_exact = bool(apart < _EXACT_RATE + np.sqrt(12) * unsure)
                 energy = float(size[line] ** 2 / (8 * size[own_line]))
@@ -100,9 +101,9 @@ def _find_side_lines(
 ) -> list[StretchLine]:
     """Find the sidebands of modes that vibrate about a slowly oscillating deformation.
 
-    A stretch q0 cos(s t + f) gives a mode two further lines, at its rate plus s and less s.  Both are equally high, and
-    their rates and phases add up to those of the mode's own line.  The energy of the stretch itself has lines at
-    multiples of s, which are no modes either.
+    A deformation q0 cos(s t + f) gives a mode two further lines, at the mode's frequency plus and minus s. Both are
+    equally high, and their frequencies and phases add up to those of the mode's own line. The energy of the deformation
+    itself has lines at multiples of s, which are not modes either.
     """
     size = np.abs(lines.weights)
     rate = lines.poles.imag
@@ -111,7 +112,8 @@ def _find_side_lines(
     middle_size = size * np.exp(lines.poles.real * span / 2)
     stretches = []
     for first, second in combinations(np.flatnonzero(size > least_size).tolist(), 2):
-        if abs(np.log(middle_size[first] / middle_size[second])) > _SAME_HEIGHT:
+        height_ratio = middle_size[first] / middle_size[second]
+        if abs(np.log(height_ratio)) > _SAME_HEIGHT:
             continue
         apart = np.abs(rate - rate[first] - rate[second]) * span
         own_line = int(np.argmin(apart))
@@ -136,9 +138,10 @@ def _find_side_lines(
 class ThirdHarmonic(NamedTuple):
     """The third harmonic of a line whose second harmonic has a locked phase; all heights refer to mid-window.
 
-    A stretch has a line and its second harmonic, and so has a spring that stiffens; a third harmonic has only the
-    spring.  ``expected`` is its height for that spring, ``measured`` what the record has there in phase with the first
-    line, ``scatter`` that of a height [energy]; ``second`` is the height of the second harmonic over the first line.
+    Both a static deformation and a stiffening spring cause a line with a second harmonic, but only the spring causes a
+    third one. ``second`` is the height of the second harmonic relative to the first line [-]. ``expected`` is the
+    height of the third harmonic of a stiffening spring, and ``measured`` the height in the record in phase with the
+    first line [energy]. ``scatter`` is the standard deviation of a height [energy].
     """
 
     second: float
@@ -169,11 +172,11 @@ def measure_third_harmonic(
     Parameters
     ----------
     stretch : StretchLine
-        The two lines.
+        The line and its second harmonic, the line ``of_mode``.
     spectrum : Spectrum
         Fitted to the grid of ``time`` (n,) [time].
     scatter : float
-        Of the height of a line [energy].
+        Standard deviation of the height of a line [energy].
     """
     middle = (time[0] + time[-1]) / 2
     lines = spectrum.lines
@@ -229,20 +232,19 @@ def _measure_locked_to(
     """Return the relative height of the harmonics of a line beyond the second, up to the first unlocked one [-]."""
     total = 0.0
     for times in _HARMONICS:
-        line = int(np.argmin(np.abs(rate - times * rate[first])))
-        apart = abs(rate[line] - times * rate[first]) * span > 2 * np.pi * _SAME_RATE
-        if line == first or apart or size[line] < ABOVE_SCATTER * scatter:
+        harmonic_rate = times * rate[first]
+        line = int(np.argmin(np.abs(rate - harmonic_rate)))
+        apart = abs(rate[line] - harmonic_rate) * span
+        is_other_rate = apart > 2 * np.pi * _SAME_RATE
+        if line == first or is_other_rate or size[line] < ABOVE_SCATTER * scatter:
             break
         # Stiffening and softening springs have harmonics of opposite signs.
-        if (
-            abs(_wrap(phase[line] - times * phase[first], np.pi))
-            > _SAME_PHASE_OF_HARMONICS
-        ):
+        turned = _wrap(phase[line] - times * phase[first], np.pi)
+        if abs(turned) > _SAME_PHASE_OF_HARMONICS:
             break
         if times > 2:
-            if (
-                size[line] > size[first]
-            ):  # A harmonic is never stronger than its fundamental line, so these lines are modes.
+            # A harmonic is never stronger than its fundamental line, so these lines are modes.
+            if size[line] > size[first]:
                 return 0.0
             total += float(size[line] / size[first])
     return total

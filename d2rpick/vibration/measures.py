@@ -1,9 +1,9 @@
 """Compute the errors of a pair (tr, td), with one function for each measure of the output.
 
-A switched run keeps of the vibration only the deformation it had at tr, and starts at td with that deformation
-and no vibration velocity.  With q the deformation in units of the square root of energy (q^2 is the elastic
-energy, signed q the deformation) the difference to the reference run after td is the free vibration that starts
-from q(tr) - q(td) and -q'(td).  All measures compare that difference with the vibration of the reference run.
+A switched run keeps only the deformation of the vibration at tr, and starts at td with this deformation and without
+vibration velocity. Let q be the signed deformation in units of the square root of energy, so that q^2 is the elastic
+energy. The difference between the switched run and the reference run after td is then the free vibration that starts
+from q(tr) - q(td) and -q'(td). All measures compare this difference with the vibration of the reference run.
 """
 
 from __future__ import annotations
@@ -62,7 +62,8 @@ class Deformation(Protocol):
 class Measured(Record):
     """Measures of one tr that require known deformations; a measure is None if it is unknown.
 
-    ``residual_low`` and ``residual_high`` bound the residual, including what the model may have missed.
+    ``residual_low`` and ``residual_high`` are bounds of the residual that allow for vibration that the model may have
+    missed.
     """
 
     sign_match: bool | None = None
@@ -82,9 +83,7 @@ def measured(
 ) -> Columns:
     """Compute a column for each field of `Measured` from times tr (n,) and one ``td``, or a td for each tr."""
     lock_in = lock_in_error(vibration, tr, td)
-    error, lowest, highest = band(
-        residual(lock_in, kinetic_share(vibration, td)), tr, td
-    )
+    error, lowest, highest = bound_residuals(vibration, lock_in, tr, td, band)
     return {
         "sign_match": sign_match(vibration, tr, td).astype(np.float64),
         "lock_in_error": lock_in,
@@ -93,6 +92,17 @@ def measured(
         "residual_high": highest,
         "timing_tolerance": tolerance,
     }
+
+
+def bound_residuals(
+    vibration: Deformation,
+    lock_in: Samples,
+    tr: Samples,
+    td: Samples | float,
+    band: Band,
+) -> tuple[Samples, Samples, Samples]:
+    """Return the stated residual of each tr (n,) with its lower and upper bound, from its error ``lock_in`` [-]."""
+    return band(residual(lock_in, kinetic_share(vibration, td)), tr, td)
 
 
 def spread(size: int, found: Sequence[tuple[NDArray[np.intp], Columns]]) -> Columns:
@@ -114,7 +124,7 @@ def compared(columns: Columns) -> NDArray[np.bool_]:
 def level_error(energy: Samples | float, level: Samples | float) -> Samples:
     """Return |sqrt(E(tr)/E(td)) - 1| [-], the relative amplitude error, in the shape of ``energy``.
 
-    NaN where an energy, or the ``level`` at td, is not positive.
+    The error is NaN if the energy is negative, or if the ``level`` at td is not positive.
 
     Examples
     --------
@@ -135,7 +145,7 @@ def level_error(energy: Samples | float, level: Samples | float) -> Samples:
 def kinetic_share(vibration: Deformation, td: Samples | float) -> Samples:
     """Return K = T(td)/V(td) [-], the kinetic fraction of the vibration energy at td, which no tr preserves.
 
-    Of the shape of ``td``.
+    The result has the shape of ``td``.
 
     V = T + (q - q0)^2 is the energy of the vibration about the preload q0; if there is no preload, V = T + E.
     """
@@ -147,9 +157,9 @@ def lock_in_error(
 ) -> Samples:
     """Return L = |q(tr) - q(td)|/sqrt(V(td)) [-], the error of the locked-in deformation, in the shape of ``tr``.
 
-    The same as |sqrt(E(tr)) - s sqrt(E(td))|/sqrt(V(td)) with s = 1 for equal signs of the deformation, else -1; for
-    several modes the root of the sum of squares over them, since their energies add up.  ``td`` is one for all
-    tr, or one for each.
+    For one mode, L = |sqrt(E(tr)) - s sqrt(E(td))|/sqrt(V(td)) with s = 1 for equal signs of the deformation, else -1.
+    For several modes, L is the root of the sum of squares over all modes, since their energies add up. ``td`` is one
+    time for all tr, or one time for each tr.
     """
     return np.asarray(
         np.sqrt(vibration.separation(tr, td)) / np.sqrt(vibration.vibration_energy(td))
@@ -161,8 +171,8 @@ def sign_match(
 ) -> NDArray[np.bool_]:
     """Return True for each tr at which the deformation has the same direction as at td.
 
-    For one mode: equal signs.  For several: the sum over q(tr) q(td) is not negative, so that a mode with almost no
-    deformation does not decide.
+    For one mode, the signs are equal. For several modes, the sum of q(tr) q(td) over all modes is not negative, so that
+    a mode with little deformation does not decide.
     """
     return np.asarray(vibration.overlap(tr, td) >= 0)
 
@@ -180,8 +190,8 @@ def band_about(
 ) -> tuple[Samples, Samples, Samples]:
     """Return a residual with its lower and upper bound, from its square and the error of the square [-].
 
-    The square may be ``off`` to either side, higher by what is ``hidden``, and lower by what is ``left_out`` [-].  No
-    square is below zero: where it may reach there, the middle of what remains is stated.
+    The square may deviate by ``off`` to either side; it may also be higher by ``hidden`` and lower by ``left_out`` [-].
+    Squares are not negative: if the band reaches below zero, the middle of its remainder is returned as the residual.
     """
     low = np.maximum(squared - off, 0.0)
     high = squared + off
@@ -192,8 +202,8 @@ def band_about(
 def phase_share(alpha: Samples | float, omega: Samples | float) -> Samples:
     """Return the fraction of the squared residual that depends on the phase of the error at td [-].
 
-    Damping takes energy where a mode moves, none where it stands still.  So the error after td, over the vibration
-    after td, is that of the energies at td but for about the damping ratio, ``alpha`` over 2 ``omega``.
+    Damping dissipates energy only while a mode moves. Therefore the error relative to the vibration after td differs
+    from that at td by a fraction of about the damping ratio, ``alpha`` divided by 2 ``omega``.
     """
     return np.asarray(_PHASES_COUNT * np.abs(alpha) / (2 * omega))
 
@@ -225,17 +235,17 @@ def run_time_share(
 ) -> float:
     """Return the expected run time of the switched run divided by that of the reference run, 1 - f (1 - (1 - c)/n) [-].
 
-    In the rigid window, a fraction f of the run, the share c of a step's cost that the switched parts' elements need is
-    saved, and there are n times fewer steps.
+    In the rigid window, which is a fraction f of the run, there are n times fewer time steps, and each step saves the
+    fraction c of its cost that the elements of the switched parts need.
 
     Parameters
     ----------
     rigid_fraction : float
         f = (td - tr)/(span of the record) [-].
     cost_share : float
-        c, from 0 to 1 [-].
+        c, the fraction of a step's cost that the elements of the switched parts need, from 0 to 1 [-].
     step_ratio : float
-        n, time step while rigid over that while deformable [-].
+        n, time step while the parts are rigid divided by the time step while they are deformable [-].
 
     Examples
     --------
@@ -248,8 +258,8 @@ def run_time_share(
 def timing_tolerance(mode: Mode, tr: Samples, td: Samples | float) -> Samples:
     """Return the time by which each tr (n,) may be wrong in either direction before L grows by 0.05 [time].
 
-    The limit is the nearest time at which q leaves the band about q(td) that is wider than the deviation at tr
-    by the tolerated growth; one period if q stays inside, since q has then passed all its values.
+    The limit is the nearest time at which |q - q(td)| exceeds its value at tr by the tolerated growth. If it never
+    does, the limit is one period, because q has then passed through all its values.
     """
     wanted = np.broadcast_to(mode.deformation(td), tr.shape)
     amplitude = np.sqrt(mode.vibration_energy(td))
@@ -269,16 +279,18 @@ def timing_tolerance(mode: Mode, tr: Samples, td: Samples | float) -> Samples:
 def _leaving(mode: Mode, edges: Samples, wanted: Samples, room: Samples) -> Samples:
     """Return the time from ``edges[0]`` until |q - wanted| first exceeds ``room``; infinity if it never does.
 
-    Between neighbouring edges q is monotone, so the place lies just before the first edge outside.
+    Between neighbouring edges q is monotone, so q leaves the band in the interval before the first edge outside the
+    band.
     """
     outside = np.abs(mode.deformation(edges) - wanted) > room
     # tr itself is inside the band, even if rounding places it outside.
     outside[0] = False
     first = np.argmax(outside, axis=0)
     column = np.flatnonzero(first > 0)
-    inner = edges[first[column] - 1, column]
-    outer = edges[first[column], column]
-    # The deformation q leaves the band above ``wanted`` if ``side`` is 1, and below ``wanted`` if ``side`` is -1.
+    first_outside = first[column]
+    inner = edges[first_outside - 1, column]
+    outer = edges[first_outside, column]
+    # The deformation q leaves the band through its upper limit if ``side`` is 1, through its lower limit if it is -1.
     middle = wanted[column]
     tolerated = room[column]
     side = np.sign(mode.deformation(outer) - middle)
@@ -297,12 +309,14 @@ def vertices(
     time: Samples, values: Samples, at: NDArray[np.intp]
 ) -> tuple[Samples, Samples]:
     """Return times and values of the vertices of parabolas through the samples ``at`` and their neighbours."""
-    step_before = time[at] - time[at - 1]
-    step_after = time[at + 1] - time[at]
-    fall = (values[at] - values[at - 1]) / step_before
-    rise = (values[at + 1] - values[at]) / step_after
-    bend = (rise - fall) / (step_before + step_after)
-    slope = (fall * step_after + rise * step_before) / (step_before + step_after)
+    before, after = at - 1, at + 1
+    step_before = time[at] - time[before]
+    step_after = time[after] - time[at]
+    both_steps = step_before + step_after
+    slope_before = (values[at] - values[before]) / step_before
+    slope_after = (values[after] - values[at]) / step_after
+    bend = (slope_after - slope_before) / both_steps
+    slope = (slope_before * step_after + slope_after * step_before) / both_steps
     # A sample next to an infinite value, or on a straight line, is its own vertex.
     bent = np.isfinite(bend) & (bend != 0)
     step = np.divide(-slope, 2 * bend, out=np.zeros(at.shape), where=bent)
@@ -346,7 +360,7 @@ class Profile(NamedTuple):
     def tolerances(self, tr: Samples, errors: Samples) -> Samples:
         """Return by how much each tr (n,) may be wrong before L grows by 0.05, up to the length of the profile [time].
 
-        ``errors`` are those at each tr; between its times the profile is linear.
+        ``errors`` are the frozen-deformation errors at each tr; the profile is linear between its times.
         """
         limit = errors + TOLERATED_GROWTH
         middle = np.searchsorted(self.time, tr)

@@ -10,9 +10,9 @@ energy of the vibration is :math:`V = \sum q_k^2`.  With m halfway between tr an
 
     R^2 = 1 + [V(t_r) - 2 X] / U(t_d)
 
-exactly, whatever the damping of each mode, for the product of two cosines is half the sum of that of their sum, which
-is twice the angle halfway, and that of their difference.  V itself is the record.  The rest follows from its lines: a
-mode has one at twice its rate and twice its decay, with half of its h for an amplitude (docs/explanation/midpoint.md).
+The formulas are exact for any damping of the modes. They follow from 2 cos a cos b = cos(a + b) + cos(a - b), where (a
++ b)/2 is the phase at m. V is the recorded energy. H and C follow from its lines: a mode with the peak energy h has a
+line of height h/2 at twice its frequency and twice its decay rate (docs/explanation/midpoint.md).
 """
 
 from __future__ import annotations
@@ -37,12 +37,13 @@ if TYPE_CHECKING:
 class Reading:
     """An interpretation of a spectrum: which of its lines are modes.
 
-    ``is_mode`` (k,) marks modes; other lines are those of a stretch, which does not vibrate.  If ``no_static`` is True
-    all of the mean is vibration, else the modes have half of it and the rest is static.  ``rest`` is the part of the
-    record beside the spectrum that is kept, at ``times`` [energy], [time].
+    ``is_mode`` (k,) marks the lines that are modes; the others are due to a static deformation. If ``no_static`` is
+    True, all of the mean energy is vibration energy; otherwise the mean energy contains half of the mode energies, and
+    its remainder is static. ``rest`` is the part of the misfit that is added to the spectrum [energy], at ``times``
+    [time]. ``tiny`` is the smallest divisor of energies [energy].
 
     ``hidden_pairs`` is the energy of pairs of modes with equal frequencies and opposite phases, whose lines cancel each
-    other, over the energy that the lines show [-].
+    other, relative to the energy of the visible modes [-].
     """
 
     spectrum: Spectrum
@@ -130,7 +131,7 @@ class Reading:
     def overlap(self, tr: Samples | float, td: Samples | float) -> Samples:
         """Return X, the product of the deformations at tr and td [energy].
 
-        It is clipped to its bounds, which noise or a wrong model may make it exceed.
+        The product is clipped to its bounds, because noise or a wrong model may cause values beyond them.
         """
         middle = (np.asarray(tr) + td) / 2
         level = self.level(middle)

@@ -1,8 +1,9 @@
 """Identify a vibration with any number of modes from the spectral lines of the energy, and list all doubts about it.
 
-Lines can be interpreted in more than one way: how much of the mean is static, and which lines belong to a stretch
-rather than a mode.  The best interpretation is used; other ones, and the lines of the record's first part, widen the
-band of its residuals.  If the record is not that of a linear structure in free flight, the reason is given.
+Lines can be interpreted in more than one way: the interpretations differ in how much of the mean is static, and in
+which lines are due to a static deformation rather than a mode. The best interpretation is used; the others, and the
+lines of the record's first part, widen the error band of its residuals. If the record is not that of a linear structure
+in free flight, the doubts give the reason.
 """
 
 from __future__ import annotations
@@ -23,7 +24,11 @@ from d2rpick.vibration.doubts import (
     StaticEnergy,
     measure_doubts,
 )
-from d2rpick.vibration.hidden_energy import find_most_hidden, measure_hidden_pairs
+from d2rpick.vibration.hidden_energy import (
+    RESOLVED,
+    find_most_hidden,
+    measure_hidden_pairs,
+)
 from d2rpick.vibration.line_scatter import LineScatter
 from d2rpick.vibration.lines import FIRST_PART, make_even_grid, predict
 from d2rpick.vibration.locked_lines import (
@@ -58,8 +63,6 @@ if TYPE_CHECKING:
 _FEWEST_STATES: Final = 32
 # A static energy up to this fraction of the mean vibration energy may be a fitting error [-].
 _NO_STATIC: Final = 0.12
-# Smallest relative energy range of a vibration [-]; single precision cannot resolve a smaller range.
-_RESOLVED: Final = 2e-7
 # Smallest divisor of energies, as a fraction of the energy range of the record [-].
 _TINY: Final = 1e-12
 # No line is ambiguous if mean energy and half of the peak energy differ by at least this fraction of the latter [-].
@@ -74,7 +77,7 @@ _FINER: Final = 4
 # _LITTLE_LEFT: largest misfit of modes that are evidence of a flight, relative to the energy range [-].
 # _LITTLE_MISSED: largest prediction error of modes that are evidence of a flight, relative to the energy range [-].
 # _EXACT: modes are treated as exact if their errors are at most this fraction of the limits for a flight [-].
-# _SLOW_TOO: slow lines are accepted as modes if the errors are at most this fraction of the limits for a flight [-].
+# _SLOW_TOO: lines without a complete cycle are modes only if errors are below this fraction of the flight limits [-].
 _LITTLE_LEFT, _LITTLE_MISSED, _EXACT, _SLOW_TOO = 0.05, 0.2, 0.1, 0.2
 
 # _LEAST_HALF: half-width of the error band of the squared residual before known errors widen the band [-].
@@ -124,36 +127,36 @@ class ModalVibration:
     Parameters
     ----------
     time : array of shape (n,)
-        Times at which the deformation is computed, close enough for the fastest line [time].
+        Times at which the deformation is computed, close enough to resolve the highest-frequency line [time].
     reading : Reading
         Chosen interpretation of the lines.
     others : tuple of Reading
         Other interpretations of the lines that the record allows.
     of_first_part : Reading
-        What the first part of the record says.
+        Interpretation of the lines in the first part of the record.
     doubts : Doubts
-        Measures of what speaks against the chosen interpretation.
+        Signs that the chosen interpretation may be wrong.
     noise : float
-        Scatter of the record about its lines [energy].
+        Standard deviation of the record about its lines [energy].
     systematic : float
-        Fraction of the scatter that neighbouring states share, and which is believed [-].
+        Fraction of the misfit that neighbouring states have in common [-].
     states_per_period : float
-        States of the record in a period of the fastest line that is told from noise [-].
+        Number of states per period of the highest-frequency line that exceeds the noise [-].
     scatter : LineScatter
-        Scatter of the squared residual that follows from that of the record.
+        Standard deviation of the squared residual due to the scatter of the record about its lines.
     with_close_modes : Reading or None
-        Interpretation in which one line is that of two close modes, and no energy is static.
+        Interpretation in which two close modes replace one line, and no energy is static; None if not possible.
     swinging : float
-        Mean energy in parts of the record that swing in a way that no mode does [energy].
+        Mean energy of slowly oscillating deformations, which are not modes [energy].
     bent : float
-        Second harmonic of a line that is, or may be, that of a stiffening spring, relative to the line; 0 if there is
-        none [-].
+        Height of the second harmonic of a line that is or may be due to a stiffening spring, relative to the line [-];
+        0 if there is no such line.
     source : str
         Name of the energy that contains the lines.
     second : ModalVibration or None
-        What the lines of the kinetic energy say, beside those of the internal energy.
+        Modes identified from the kinetic energy, to confirm those of the internal energy; None if unknown.
     last_resort : bool
-        Whether nothing better is known, so that more doubts are allowed.
+        True if no other model is available, so that the limits of the doubts are wider.
     """
 
     time: Samples
@@ -301,7 +304,8 @@ class ModalVibration:
     ) -> tuple[Samples, Samples, Samples]:
         """Return the error of the squared residual of pairs, and how far other interpretations lower and raise it [-].
 
-        Alternatives are other interpretations of the lines, and what the kinetic energy says: each is on one side.
+        Other interpretations are those of the lines and the modes of the kinetic energy; each widens the band on one
+        side.
         """
         reading, level = self.reading, self.reading.level(td)
         squared = reading.residual_squared(tr, td)
@@ -366,7 +370,7 @@ class ModalVibration:
     def unseen(self, tr: Samples | float, td: float) -> Samples:
         """Return the vibration energy fraction that a hidden mode needs at td to explain the error band of each tr [-].
 
-        A hidden mode in opposite phase at tr and td adds four times its share to the squared residual.
+        A hidden mode in opposite phase at tr and td adds four times its energy fraction to the squared residual.
         """
         return self.half_width(tr, td) / 4
 
@@ -376,7 +380,9 @@ class ModalVibration:
         ends = self.time[[0, -1]]
         level = self.reading.level_of_modes(ends)
         static = self.reading.spectrum.mean.at(ends) - level / 2
-        return float((static[0] - static[1]) / max(np.mean(level) / 2, 1e-300))
+        decrease = static[0] - static[1]
+        mean_vibration = max(np.mean(level) / 2, 1e-300)
+        return float(decrease / mean_vibration)
 
     @cached_property
     def _phase_share(self) -> float:
@@ -407,9 +413,9 @@ class ModalVibration:
         """Return by how much other interpretations of the spectral lines lower and raise the squared residual [-].
 
         Part of the static energy may be due to spectral lines hidden in the misfit.  That part is limited by the energy
-        that the misfit can hide, and by the static energy itself.  A mode that does not complete a cycle is confused
-        with slow decays, so what the first part of the record says of it is another interpretation.  So are two close
-        modes, whose beat seems to be static energy.
+        that the misfit can hide, and by the static energy itself.  A mode that does not complete a cycle may be
+        confused with slow decays, so its line in the first part of the record is another interpretation. Two close
+        modes are a further one, because their beat looks like static energy.
         """
         none = np.zeros(squared.shape)
         shifts = [reading.residual_squared(tr, td) - squared for reading in self.others]
@@ -445,13 +451,13 @@ def identify_modal(
 ) -> ModalVibration | None:
     """Identify the modes of a structure from its energy in free flight; None if the energy has no spectral lines.
 
-    The kinetic energy has the lines of the internal energy with the opposite sign, and everything else in the kinetic
-    energy changes slowly: the sum of elastic and kinetic energy of a mode falls monotonically.
+    The kinetic energy has the lines of the internal energy with the opposite sign, because the sum of the elastic and
+    the kinetic energy of a mode falls monotonically. Everything else in the kinetic energy changes slowly.
 
     Parameters
     ----------
     time, energy : array of shape (n,)
-        [time], [energy], of the whole structure that vibrates together.
+        Times [time], and the energy of the whole connected structure [energy].
     kinetic : bool
         True if ``energy`` is the kinetic energy rather than the internal energy.
 
@@ -475,17 +481,15 @@ def identify_modal(
         return None
     grid = make_even_grid(time, energy)
     prediction = predict(grid)
-    if prediction is None or prediction.swing <= _RESOLVED * float(
-        np.abs(energy).max()
-    ):
+    if prediction is None or prediction.swing <= RESOLVED * float(np.abs(energy).max()):
         return None
-    # What misses more is refused with any lines.
+    # If the prediction error is larger, the record is refused, whatever its lines.
     if prediction.missed <= MOST_MISSED:
         prediction = refine_prediction(grid, prediction)
     misfit = prediction.spectrum.error / prediction.swing
     systematic = _correlate_neighbours(prediction.spectrum.rest)
     if not _predicts_within(_SLOW_TOO, prediction.missed, misfit, systematic):
-        # An energy that is not a sum of lines, as under friction, has slow changes that are not modes.
+        # If the energy is not a sum of lines, for example because of friction, its slow changes are not modes.
         prediction = prediction.count_slow_as_mean(grid.span)
     if not prediction.spectrum.lines.poles.size:
         return None
@@ -512,14 +516,16 @@ def _can_decide(internal: ModalVibration, kinetic: ModalVibration) -> bool:
     """Return True if the kinetic energy may be used because plastic flow or a damper makes the internal energy useless.
 
     The internal energy then contains at least the elastic half of the vibration, and its value halfway can be used.
-    Plastic flow and dampers add to it.  If the static energy falls instead, a deformation relaxes, which moves the
-    parts although it does not vibrate.
+    Plastic flow and dampers only add to it. If the static energy falls instead, a static deformation relaxes, which
+    moves the parts without vibration.
     """
     if internal.fallen > _NO_STATIC:
         return False
-    held = float(np.mean(internal.reading.spectrum.mean.at(internal.time)))
-    needed = float(np.mean(kinetic.reading.level_of_modes(internal.time))) / 2
-    return held > (1 - MOST_NEGATIVE) * needed and internal.doubts.beyond < MOST_BEYOND
+    times = internal.time
+    mean_energy = float(np.mean(internal.reading.spectrum.mean.at(times)))
+    elastic_half = float(np.mean(kinetic.reading.level_of_modes(times))) / 2
+    is_contained = mean_energy > (1 - MOST_NEGATIVE) * elastic_half
+    return is_contained and internal.doubts.beyond < MOST_BEYOND
 
 
 def _predicts_within(
@@ -527,7 +533,8 @@ def _predicts_within(
 ) -> bool:
     """Return True if the error of the lines, apart from white noise, is below the ``share`` of the acceptable error.
 
-    ``missed`` and ``misfit`` as in `Doubts`; neighbouring states share the fraction ``systematic``.
+    ``missed`` and ``misfit`` are those of `Doubts`; ``systematic`` is the fraction of the misfit that neighbouring
+    states have in common [-].
     """
     white = 1 - systematic
     structure = misfit * np.sqrt(systematic)
@@ -578,7 +585,7 @@ def _read(
 ) -> ModalVibration:
     """Return the best interpretation of the lines with its alternatives; the mean of a ``kinetic`` energy is ignored.
 
-    ``window`` is the time from the first state to the last, which means over the grid's blocks do not reach [time].
+    ``window`` contains the times of the first and last states [time]; the grid of block means is shorter.
     """
     spectrum = prediction.spectrum
     scatter = spectrum.error * np.sqrt(2 / grid.time.size)
@@ -653,9 +660,9 @@ def _choose_interpretation(
 ) -> _Interpretation:
     """Decide whether the lines of static deformations are modes, and whether part of the mean energy is static.
 
-    In the ``plain`` reading all lines are modes and all of the mean is vibration.  ``may_be_spring`` is True if a
-    second harmonic may be that of a stiffening spring, ``systematic`` the fraction of the misfit that neighbouring
-    states have in common.
+    In the ``plain`` interpretation, all lines are modes and all of the mean energy is vibration energy.
+    ``may_be_spring`` is True if a second harmonic may be that of a stiffening spring. ``systematic`` is the fraction of
+    the misfit that neighbouring states have in common [-].
     """
     spectrum = plain.spectrum
     time = plain.times
@@ -735,9 +742,13 @@ def _compute_sine(squared: Samples) -> Samples:
 def _count_states(lines: Exponentials, grid: Grid, scatter: float) -> float:
     """Return the number of states per period of the highest-frequency relevant line that exceeds the noise."""
     sizes = np.abs(lines.weights)
-    least = max(NOTABLE * float(sizes.max(initial=0.0)), ABOVE_SCATTER * scatter)
-    fastest = float(lines.poles.imag[sizes > least].max(initial=0.0))
-    return 2 * np.pi / (fastest * grid.spacing) if fastest > 0 else np.inf
+    strongest = float(sizes.max(initial=0.0))
+    least = max(NOTABLE * strongest, ABOVE_SCATTER * scatter)
+    rates = lines.poles.imag[sizes > least]
+    highest_rate = float(rates.max(initial=0.0))
+    if highest_rate > 0:
+        return 2 * np.pi / (highest_rate * grid.spacing)
+    return np.inf
 
 
 def _mask_modes(lines: Exponentials, stretches: tuple[StretchLine, ...]) -> Mask:
@@ -751,7 +762,10 @@ def _close_times(reading: Reading, window: tuple[float, float], fewest: int) -> 
     """Return times in a window [time], so closely spaced that a parabola through three of them locates a minimum."""
     rates = reading.modes.poles.imag
     sizes = np.abs(reading.modes.weights)
-    notable = rates[sizes > NOTABLE * sizes.max(initial=0.0)]
+    strongest = sizes.max(initial=0.0)
+    notable = rates[sizes > NOTABLE * strongest]
+    highest_rate = float(notable.max(initial=0.0))
     start, end = window
-    periods = (end - start) * float(notable.max(initial=0.0)) / (2 * np.pi)
-    return np.linspace(start, end, int(max(fewest, _TIMES_PER_PERIOD * periods)) + 1)
+    periods = (end - start) * highest_rate / (2 * np.pi)
+    intervals = int(max(fewest, _TIMES_PER_PERIOD * periods))
+    return np.linspace(start, end, intervals + 1)

@@ -48,7 +48,7 @@ def find_described(
     td : float
         [time]
     guess : Span or None
-        Where the energy seems to keep its level [time].
+        Window in which the energy seems to keep its level [time]; None if there is none.
     """
     windows = _list_windows(history, td, guess)
     grown = (_grow_described(history, window) for window in windows)
@@ -72,7 +72,7 @@ def _rate_window(described: ModalWindow) -> tuple[bool, bool, float]:
 def _grow_described(history: History, window: Span) -> ModalWindow | None:
     """Extend a window if its modes continue undisturbed outside it; otherwise return None.
 
-    The result depends on the window alone, not on the td that was asked for first.
+    The result depends only on the window, not on the td for which the window was first needed.
     """
     vibration = identify_window(history, window)
     if vibration is None or not vibration.convinces:

@@ -1,8 +1,8 @@
 """Decide which vibration model is reliable at a td, and describe the vibration by this model.
 
-The order is that of `MODELS`: an oscillator that describes the record before the modes of the structure and counted
-swings unless it leaves much over, and these before the energy alone.  The result is a `Vibration`: the energy around
-td, and the deformations that can be compared with those at td, if any are known.
+The order is that of `MODELS`: an oscillator that describes the record with a small misfit, then the modes of the
+structure, then counted half cycles, then the energy alone. The result is a `Vibration`: the energy around td, and the
+deformations that can be compared with those at td, if any are known.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from d2rpick.vibration.moments import (
     SampledEnergy,
     find_moments_of_mode,
 )
-from d2rpick.vibration.oscillator_band import residual_band
+from d2rpick.vibration.oscillator_band import OscillatorBand
 from d2rpick.vibration.span import SMALLEST
 
 if TYPE_CHECKING:
@@ -62,8 +62,8 @@ _OF_INTERVAL, _OF_INTERVAL_BY_MODES = 0.5, 0.125
 class Compared(NamedTuple):
     """Deformations at the times from ``first`` to ``last`` [time], all of which can be compared with that at td.
 
-    ``profile`` returns their frozen-deformation error before a td; it is None if there is only one mode, which has a
-    closed form. ``band`` is that of a residual.
+    ``profile`` returns the frozen-deformation errors before a td; it is None for a single mode, whose errors have a
+    closed form. ``band`` returns a residual with its lower and upper bound.
     """
 
     deformation: Deformation
@@ -84,15 +84,15 @@ class Vibration:
     whole : SampledEnergy
         The energy of all parts together.
     compared : Compared or None
-        None where no deformation with its sign is known, and ``unknown`` says why.
+        None if no deformation with its sign is known; ``unknown`` is then the reason.
     undescribed : str
-        Why a single tr has no measures although deformations are known.
+        Reason why some tr have no measures although deformations are known.
     told : str
         Description of the model that gives the sign.
     estimated : str or None
-        What the kinetic share is an estimate from, and why; None where it is none.
+        Source of an estimated kinetic share, and the reason for the estimate; None if the share is not estimated.
     doubts : tuple of str
-        Why the level at td means nothing, so that no tr can be trusted.
+        Reasons why the energy at td is meaningless, so that no tr can be trusted.
     """
 
     basis: str
@@ -163,7 +163,7 @@ class Vibration:
     def moments(self, tolerance: float, since: float = -np.inf) -> Moments:
         """Return candidate times before td: level crossings, extrema near the level, and closest matches.
 
-        Times before ``since`` [time] may be left out.
+        Times before ``since`` [time] may be omitted.
         """
         if self.compared and isinstance(self.whole, OscillatorEnergy):
             turns = self.whole.standstills()
@@ -208,7 +208,8 @@ class Vibration:
     def errors(self, times: Samples) -> Samples:
         """Return the errors to which the tolerance applies [-], in the shape of ``times``; infinity if no tr is useful.
 
-        The frozen-deformation error if signs are known (for a few modes only if they match), else the level error.
+        This is the frozen-deformation error if signs are known (for a few modes, only if they match), else the level
+        error.
         """
         if self.compared is None:
             errors = measures.level_error(
@@ -230,8 +231,8 @@ class Vibration:
     def reach(self, moments: Moments) -> Samples:
         """Return the uncertainty of each moment [time], which is a fraction of a profile interval for a closest match.
 
-        A match lies at a minimum of the error: in the same interval if only states are known, and much nearer to the
-        vertex of a parabola if the error between them is known.
+        A closest match is a minimum of the error. The true minimum lies in the same interval if only states are known,
+        and much closer if the error between the states is known, because the match is then the vertex of a parabola.
         """
         reach = self.whole.reach(moments.tr)
         if self.profile is None:
@@ -246,6 +247,19 @@ class Vibration:
         if self.compared is None:
             return np.zeros(times.shape, dtype=bool)
         return (times >= self.compared.first) & (times <= self.compared.last)
+
+    def compute_residuals(self, tr: Samples) -> Samples:
+        """Return the stated residual of each tr (n,); NaN where the deformation cannot be compared with that at td."""
+        residuals = np.full(tr.shape, np.nan)
+        is_comparable = self.comparable(tr)
+        if is_comparable.any():
+            assert self.compared
+            deformation, times = self.compared.deformation, tr[is_comparable]
+            lock_in = measures.lock_in_error(deformation, times, self.td)
+            residuals[is_comparable], _, _ = measures.bound_residuals(
+                deformation, lock_in, times, self.td, self.compared.band
+            )
+        return residuals
 
     def measures_of(self, tr: Samples, td: Samples | float) -> Columns:
         """Return the measures of comparable times (n,) as columns; for a single mode, ``td`` may be an array (n,)."""
@@ -297,7 +311,7 @@ def measure_all(
 ) -> tuple[Samples, Columns]:
     """Return the energy of each tr (n,), and its measures if its deformation can be compared with that at its td.
 
-    The times of the i-th vibration lie between the i-th of the ``ends`` and the next one.
+    The times of the i-th vibration are those from index ``ends[i]`` to ``ends[i + 1]``.
     """
     energy = np.empty(tr.shape)
     columns = []
@@ -346,9 +360,9 @@ def _group_alike(vibrations: Sequence[Vibration]) -> Iterable[list[int]]:
 class Evidence(NamedTuple):
     """The models found in a record, whether or not they are reliable at a td.
 
-    ``fit`` is None only if no oscillator was fitted; ``span`` is the window that it describes.  ``given`` is True for
-    a given oscillator, ``prescribed`` also for a given window.  ``models`` are the other models by name; at most one
-    tells the sign.
+    ``fit`` is None only if no oscillator was fitted; ``span`` is the window that it describes. ``given`` is True if the
+    user gave the oscillator, ``prescribed`` if the user gave the oscillator or its window. ``models`` contains the
+    other models by name; at most one of them gives the sign.
     """
 
     fit: Identification | None = None
@@ -482,7 +496,7 @@ def find_energy_at(history: History, td: float, evidence: Evidence) -> Vibration
         whole.mode,
         *whole.span,
         None,
-        partial(residual_band, fit),
+        OscillatorBand(fit, td).bound_residual,
     )
     return Vibration(
         "oscillator", whole, compared, undescribed="not described by the oscillator"

@@ -39,23 +39,23 @@ class Mode(SignedAmplitudes):
         E(t) = E_{pl} + q(t)^2, \quad
         q(t) = q_0 + e^{-\alpha s/2} (a \cos\omega s + b \sin\omega s), \quad s = t - t_0
 
-    q is the deformation in units of the square root of energy: with spring k and deformation r = y - z of
-    the floating oscillator, q = sqrt(k/2) r, so that q**2 is the elastic energy.  The sign of q as a whole is
-    not observable in E; only products of two values of q have a meaning.
+    q is the deformation in units of the square root of energy: for the floating oscillator with stiffness k and
+    deformation r = y - z, q = sqrt(k/2) r, so that q**2 is the elastic energy. The energy does not show the overall
+    sign of q; only products of two values of q are meaningful.
 
     Parameters
     ----------
     omega : float
-        Damped angular rate of the deformation, positive [1/time]; the energy repeats at twice that rate.
-        omega_2 of equation (4) of the paper.
+        Damped angular frequency of the deformation, positive [1/time]; that of the energy is twice as high. It is
+        omega_2 in equation (4) of the paper.
     alpha : float
-        Mass-proportional damping [1/time].
+        Coefficient of mass-proportional damping [1/time].
     cosine, sine : float
         a and b [sqrt(energy)].
     origin : float
         t_0 [time].
     energy_plastic : float
-        Part of the energy that does not come back [energy].
+        Irrecoverable part of the energy, E_pl [energy].
     preload : float
         q_0, deformation about which the mode vibrates [sqrt(energy)].
 
@@ -172,7 +172,7 @@ class Mode(SignedAmplitudes):
     def peaks(self, start: float, end: float) -> tuple[float, ...]:
         """Find the times in (start, end) at which the energy has a local maximum [time], in ascending order.
 
-        At q' = 0, q'' = -omega_0**2 (q - q_0), so that E'' = 2 q q'' < 0 requires q (q - q_0) > 0.
+        If q' = 0, then q'' = -omega_0**2 (q - q_0), so E'' = 2 q q'' is negative only if q (q - q_0) > 0.
         """
         times = np.array(self.extrema(start, end))
         q = self.deformation(times)
@@ -181,7 +181,7 @@ class Mode(SignedAmplitudes):
     def crossings(self, level_q: float, start: float, end: float) -> tuple[float, ...]:
         """Find the times in (start, end) at which q equals ``level_q`` [time], ascending and accurate to rounding.
 
-        An extremum that only touches the level (to rounding) is no crossing, nor are ``start`` and ``end``.
+        Extrema that only touch the level (within rounding) are not crossings, and neither are ``start`` and ``end``.
         """
         return tuple(
             self._passages(np.array([level_q]), start, np.array([end]))[1].tolist()
@@ -196,7 +196,7 @@ class Mode(SignedAmplitudes):
     ) -> tuple[NDArray[np.intp], Samples]:
         """Find the level crossings for every ``td`` (n,) at once; return the td index and the time of each crossing."""
         level = self.deformation(td)
-        # Each zero of q is a single crossing of the level zero, whatever the sign of the rounding error.
+        # Each zero of q is counted as one zero crossing, whatever the sign of the rounding error.
         zero = np.abs(level) <= _ZERO * np.sqrt(self.vibration_energy(td))
         level = np.where(zero, 0.0, level)
         ends = np.append(td, np.where(zero, start, td))
@@ -210,7 +210,7 @@ class Mode(SignedAmplitudes):
     ) -> tuple[NDArray[np.intp], Samples]:
         """Find the times in (start, end) at which q equals a level, for each level and end, both of shape (n,).
 
-        Return the indices of the levels and the times, ascending in both.
+        Return the indices of the levels and the times, sorted by index and then by time.
         """
         inner = np.array(self.extrema(start, float(ends.max(initial=start))))
         rows = np.broadcast_to(inner, (ends.size, inner.size))
@@ -276,7 +276,7 @@ def compute_energy_and_jacobian(
 ) -> tuple[Samples, Samples]:
     """Return E(s), shape (n,), and its derivatives with respect to the first ``size`` parameters, shape (size, n).
 
-    The parameters are omega, alpha, cosine, sine, energy_plastic, preload of a `Mode` with its origin at s = 0.
+    The parameters are omega, alpha, cosine, sine, energy_plastic and preload of a `Mode` whose origin is s = 0.
     """
     omega, alpha, cosine, sine, plastic, preload = parameters.tolist()
     angle = omega * s

@@ -1,6 +1,6 @@
 """Find candidate times for tr: times at which the total energy equals that at td, with their errors.
 
-The energy around a td is known by its samples, or by modes that describe them.
+The energy around a td is known from its samples or from modes that describe the samples.
 """
 
 from __future__ import annotations
@@ -235,8 +235,8 @@ class OscillatorEnergy(SampledEnergy):
 class Moments:
     """Candidate times for tr, before any error is computed, as columns of shape (n,).
 
-    Noise makes tens of thousands, and few of them are examined singly.  ``tr`` [time]; ``kind``: index of the kind's
-    name; ``rising``: 1 if the energy rises, -1 if it falls, 0 if neither.
+    Columns save time, because noise may cause tens of thousands of candidates. ``tr`` contains the times [time], and
+    ``kind`` the index of the kind's name. ``rising`` is 1 if the energy rises, -1 if it falls, and 0 otherwise.
     """
 
     tr: Samples
@@ -299,7 +299,8 @@ def find_moments_of_mode(
 ) -> list[Moments]:
     """Return the moments of one mode in one window for each ``seen`` energy and its td, in ascending order.
 
-    Standstills count within the ``tolerance``; crossings before each of ``since`` [time] may be left out.
+    Extrema of the energy are moments if their error is within the ``tolerance`` [-]. Crossings before the time in
+    ``since`` for the respective energy [time] may be omitted.
     """
     mode = seen[0].mode
     td = np.array([energy.td for energy in seen])
@@ -342,16 +343,16 @@ def compute_sampled_reach(
     ----------
     history : History
     times : array of shape (n,)
-        Switch times tr found at ``level`` [time].
+        Switch times tr at which the energy equals ``level`` [time].
     td : float
         [time]
     level : float
-        Energy assumed at td, from the samples or, with its own error, from a fit [energy].
+        Energy assumed at td [energy]; it is that of the samples or of a fit.
 
     Returns
     -------
     array of shape (n,)
-        The true crossing lies within tr - x and tr + x [time]; at most two output intervals.
+        The true crossing lies between tr - x and tr + x [time]; x is at most two output intervals.
     """
     time = history.time
     energy = history.energy
@@ -380,9 +381,9 @@ def compute_fitted_reach(
 ) -> Samples:
     """Return the error of tr if both tr and the energy level at td are computed from the fitted oscillator [time].
 
-    The energy error is that of the fitted curve at tr and at td: its standard deviation, due to the scatter of the
-    record about it, and the systematic part of the misfit.  Arguments and result are those of
-    ``compute_sampled_reach``, except the level.
+    The energy error is that of the fitted curve at tr and at td. It consists of the standard deviation due to the
+    scatter of the record about the curve, and the systematic part of the misfit. The arguments and the result are those
+    of ``compute_sampled_reach``, but there is no ``level``.
     """
     all_times = np.append(times, td)
     deviation = _DEVIATIONS * fit.energy_deviation(
@@ -419,7 +420,8 @@ def _find_cells(time: Samples, at: Samples) -> tuple[NDArray[np.intp], Samples]:
 def _compute_rounding(history: History, at: Samples) -> tuple[Samples, Samples]:
     """Return the largest error and the mean square error of interpolated energies due to printed digits [energy].
 
-    Energy and time of both neighbours are off by up to half a quantum each, uniformly distributed.
+    The energies and times of both neighbours have errors of up to half of their last printed digit, uniformly
+    distributed.
     """
     cell, interval = _find_cells(history.time, at)
     distance = at - history.time[cell]
@@ -462,13 +464,14 @@ def compute_reach(
 ) -> Samples:
     """Return the error of a crossing time due to the energy error ``error`` [time].
 
-    The smaller root x of slope x - bend x^2/2 = error; if there is no root, the curve may turn before it reaches the
-    level, and sqrt(2 error/bend) is the distance at which the bend alone accounts for the error.
+    The result is the smaller root x of slope x - bend x^2/2 = error. If there is no root, the curve may have an
+    extremum before it reaches the level; the result is then sqrt(2 error/bend), the distance at which the curvature
+    alone causes the error.
 
     Parameters
     ----------
     slope, bend, error : array_like
-        |E'| [energy/time], |E''| [energy/time^2] and the energy error [energy], not negative.
+        |E'| [energy/time], |E''| [energy/time^2] and the energy error [energy]; none is negative.
 
     Examples
     --------

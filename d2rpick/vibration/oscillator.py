@@ -1,13 +1,14 @@
 """Compute the motion of a floating oscillator (two masses, a spring, no support), free or rigid, in closed form.
 
-Source: "Analysis of switched-rigid floating oscillator" (Shock and Vibration); equation numbers in this
-module are that paper's.  Frame mass ``m`` with displacement ``z``, suspended mass ``M`` with displacement
-``y``, spring ``k``, damping proportional to mass with rate ``alpha`` on both.  Any consistent units.
+Source: "Analysis of switched-rigid floating oscillator" (Shock and Vibration); equation numbers refer to that paper.
+The frame of mass ``m`` has the displacement ``z``, and the suspended mass ``M`` the displacement ``y``. A spring of
+stiffness ``k`` connects them, and mass-proportional damping with the rate ``alpha`` acts on both. Units are consistent.
 
-The closed forms here take any initial state.  They split the motion into the centre of mass, which damping
-alone slows down, and the spring deformation ``r = y - z`` with ``r'' + alpha r' + omega_0^2 r = 0``.  The
-paper's equations (7) are the case z = y = y' = 0, z' = V0; the spring-back, equation (18), is the free motion that
-starts from the frozen deformation with both masses at one speed.  A `Replay` runs it through tr and td.
+The closed forms in this module accept any initial state. They split the motion into that of the centre of mass, which
+only damping slows down, and the spring deformation ``r = y - z`` with ``r'' + alpha r' + omega_0^2 r = 0``. Equations
+(7) of the paper are the case z = y = y' = 0, z' = V0. The spring-back, equation (18), is the free motion that starts
+from the frozen deformation with equal velocities of both masses. A `Replay` computes the motion before tr, from tr to
+td, and after td.
 """
 
 from __future__ import annotations
@@ -52,8 +53,8 @@ class State(NamedTuple):
 class Oscillator:
     """A floating oscillator; raise RangeError unless stiffness and masses are from 1e-100 to 1e100 and alpha is finite.
 
-    ``stiffness`` k [force/length], ``mass`` M (suspended) and ``frame_mass`` m [mass], ``alpha`` [1/time].
-    A slightly negative alpha, as a fit to scattered samples may give, makes the motion grow.
+    ``stiffness`` k [force/length], ``mass`` M (suspended) and ``frame_mass`` m [mass], ``alpha`` [1/time]. ``alpha``
+    may be slightly negative, because a fit to noisy samples may yield such a value; the motion then grows.
     """
 
     stiffness: float
@@ -73,7 +74,7 @@ class Oscillator:
 
     @property
     def reduced_mass(self) -> float:
-        """Return mu = m M/(m + M), the mass that vibrates against the spring."""
+        """Return the reduced mass mu = m M/(m + M) of the two masses that the spring connects."""
         return self.frame_mass * self.mass / (self.frame_mass + self.mass)
 
     @property
@@ -104,7 +105,7 @@ class Oscillator:
         Parameters
         ----------
         start : State
-            Numbers, or arrays that broadcast with ``elapsed``.
+            Initial state; its values are numbers or arrays that broadcast with ``elapsed``.
         elapsed : array_like
             Time since ``start``, not negative [time].
 
@@ -131,9 +132,10 @@ class Oscillator:
     def free_on_grid(self, start: State, step: float, count: int) -> State:
         """Return the states at ``step * arange(count)`` of free motion from ``start``, faster than ``free`` does.
 
-        On an even grid, t = t_row + t_column, every exponential is a product of a factor per row and one per
-        column of a table, so a displacement is a matrix product of rank four.  Agrees with ``free`` to a few
-        units of the last digit.  ``start`` holds numbers.  Falls back to ``free`` unless underdamped.
+        On an even grid, the times form a table with t = t_row + t_column. Each exponential is then the product of a
+        factor for its row and a factor for its column, so a displacement is a matrix product of rank four. The result
+        agrees with that of ``free`` to a few units in the last digit. The values of ``start`` must be numbers. Unless
+        the motion is underdamped, ``free`` is called.
         """
         omega = self.omega_2
         if not omega > 0:
@@ -187,8 +189,8 @@ class Oscillator:
     def rigid(self, start: State, elapsed: ArrayLike) -> State:
         """Return the state after ``elapsed`` of rigid motion from ``start``, equations (8) to (12) of the paper.
 
-        At the switch momentum is kept, the relative velocity is lost and the deformation is frozen, so
-        ``rigid(start, 0)`` is the state right after the switch.  Arguments as in ``free``.
+        The switch preserves the momentum, removes the relative velocity, and freezes the deformation. Therefore
+        ``rigid(start, 0)`` is the state immediately after the switch. The arguments are those of ``free``.
         """
         t = np.asarray(elapsed, dtype=np.float64)
         _, velocity = self._centre(start)
@@ -231,8 +233,8 @@ class Oscillator:
     def _vibration(self, t: Values) -> tuple[Values, Values]:
         """Return exp(-alpha t/2) times cos(omega_2 t) and sin(omega_2 t)/omega_2, continued to any damping.
 
-        If overdamped, it is the sum of two decaying exponentials.  The slower rate alpha/2 - kappa is computed
-        from the product of the rates, omega_0^2, because the difference would lose all digits.
+        An overdamped motion is the sum of two decaying exponentials. The slower rate alpha/2 - kappa is computed from
+        the product of both rates, omega_0^2, because the difference would lose all digits.
         """
         square = self._squared_damped_rate
         if square >= 0:
@@ -270,8 +272,8 @@ def compute_lacking_energy(
 def make_from_mode(mode: Mode, time: Values | float) -> tuple[Oscillator, State]:
     """Return an oscillator with the same deformation as ``mode`` about its preload, and its state at ``time``.
 
-    An energy history contains neither masses nor the motion of the centre of mass; they are chosen so that the
-    deformation equals q - q0 (k = 2), with equal masses and the centre of mass at rest.
+    An energy history contains neither the masses nor the motion of the centre of mass. The stiffness k = 2 makes the
+    deformation equal to q - q0; the masses are equal, and the centre of mass is at rest.
     """
     mass = 4 / mode.omega_0**2
     q = mode.deformation(time) - mode.preload
@@ -283,8 +285,8 @@ def make_from_mode(mode: Mode, time: Values | float) -> tuple[Oscillator, State]
 def to_mode(oscillator: Oscillator, v0: float) -> Mode:
     """Return the vibration mode of an ``oscillator`` whose frame has the velocity ``v0`` at time 0 and all else rests.
 
-    Raise RangeError if it is overdamped, since such a motion has no vibration to lock in, or if its energies cannot be
-    squared.
+    Raise RangeError if the oscillator is overdamped, because it then has no vibration to freeze, or if squares of its
+    energies would overflow.
     """
     omega = oscillator.omega_2
     if not omega > 0:
@@ -304,7 +306,7 @@ def to_mode(oscillator: Oscillator, v0: float) -> Mode:
 class Replay:
     """Motion from ``start`` at ``origin``, rigid from ``tr`` to ``td``; raise RangeError unless origin <= tr <= td.
 
-    Times in the unit of the run.
+    All times have the unit of the run.
     """
 
     oscillator: Oscillator
@@ -326,7 +328,7 @@ class Replay:
     def motion(self, time: Values | float) -> State:
         """Return the states of the switched run at ``time``: equations (7), (9) to (12), and (18) of the paper.
 
-        At tr itself, the state after the switch.
+        At tr itself, the state is that after the switch.
         """
         time = np.asarray(time, dtype=np.float64)
         released = self.oscillator.rigid(self.reference(self.tr), self.td - self.tr)
@@ -367,8 +369,8 @@ def compute_trajectory(
 ) -> Trajectory:
     """Compute the motion at 0, dt, 2 dt, ... up to ``t_end`` [time]; ``switched`` defines the rigid window, if any.
 
-    Times are rounded to the 14th digit of ``t_end``, so that a multiple of dt equals a switch time that is written
-    alike.
+    Times are rounded to the 14th digit of ``t_end``, so that a multiple of dt equals a switch time with the same
+    decimal digits.
     """
     count = int(np.floor(t_end / dt * (1 + 1e-12))) + 1
     with np.errstate(all="ignore"):

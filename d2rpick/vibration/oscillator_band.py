@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from d2rpick.base.caching import cached_property
 from d2rpick.vibration import measures
 from d2rpick.vibration.modes import Mode
 from d2rpick.vibration.span import SMALLEST
@@ -20,88 +21,130 @@ _HARMLESS: Final = 0.25**2
 _HARMONIC_COUNTS: Final = 8.0
 
 
-def residual_band(
-    fit: Identification, stated: Samples, tr: Samples, td: Samples | float
-) -> tuple[Samples, Samples, Samples]:
-    """Return the residual of each tr (n,) with its lower and upper bound [-].
+class OscillatorBand:
+    """The error band of residuals by an identified oscillator; ``fit`` is accepted, ``td`` is the usual td [time]."""
 
-    If scatter lets the square reach below zero, the middle of the rest is stated: a peak chosen from noise is not
-    exact.  A hidden mode is in opposite phase in the worst case, and absent in the best.  If it may raise the residual
-    above 0.25, the middle of what is above is stated.
+    def __init__(self, fit: Identification, td: float) -> None:
+        assert fit.mode is not None
+        self._fit, self._mode, self._td = fit, fit.mode, td
 
-    Parameters
-    ----------
-    fit : Identification
-        Accepted.
-    stated : array of shape (n,)
-        Residuals by its mode [-].
-    tr : array of shape (n,)
-        [time]
-    td : float or array of shape (n,)
-        [time]
-    """
-    assert fit.mode is not None
-    mode = fit.mode
-    squared = np.square(stated)
-    scatter = measures.BAND_DEVIATIONS * _compute_deviation(fit, tr, td)
-    share = measures.phase_share(mode.alpha, mode.omega)
-    bent = _HARMONIC_COUNTS * fit.hidden_share * stated
-    off = scatter + share * squared + bent
-    opposed = _count_opposed(fit, tr, td)
-    decayed = _count_decayed(fit, tr, td)
-    # The misfit may hide a lasting mode or a mode that decays early; the larger effect of the two is assumed.
-    hidden = np.maximum(fit.hidden_share * opposed, decayed)
-    stated_now, low, high = measures.band_about(
-        squared, off, hidden, fit.hidden_share * squared
-    )
-    # A hidden mode is assumed to exist with a probability of 1/2.
-    # The stated residual therefore includes half of the hidden mode's effect beyond the solver error.
-    solver_error = SMALLEST * mode.vibration_energy(tr) / mode.vibration_energy(td)
-    beyond_solver = np.maximum(
-        max(fit.hidden_share - SMALLEST, 0.0) * opposed, decayed - solver_error
-    )
-    notable = np.maximum(beyond_solver - _HARMLESS, 0.0)
-    return np.sqrt(np.square(stated_now) + notable / 2), low, high
+    def bound_residual(
+        self, stated: Samples, tr: Samples, td: Samples | float
+    ) -> tuple[Samples, Samples, Samples]:
+        """Return the residual of each tr (n,) with its lower and upper bound [-].
+
+        If scatter lets the square reach below zero, the middle of the rest is stated: a peak chosen from noise is not
+        exact.  A hidden mode is in opposite phase in the worst case, and absent in the best.  If it may raise the
+        residual above 0.25, the middle of what is above is stated.
+
+        Parameters
+        ----------
+        stated : array of shape (n,)
+            Residuals by the mode of the fit [-].
+        tr : array of shape (n,)
+            [time]
+        td : float or array of shape (n,)
+            [time]
+        """
+        fit, mode = self._fit, self._mode
+        squared = np.square(stated)
+        scatter = measures.BAND_DEVIATIONS * self._compute_deviation(tr, td)
+        share = measures.phase_share(mode.alpha, mode.omega)
+        bent = _HARMONIC_COUNTS * fit.hidden_share * stated
+        off = scatter + share * squared + bent
+        opposed = _count_opposed(mode, tr, td)
+        decayed = _count_decayed(fit, mode, tr, td)
+        # The misfit may hide a lasting mode or a mode that decays early; the larger effect of the two is assumed.
+        hidden = np.maximum(fit.hidden_share * opposed, decayed)
+        stated_now, low, high = measures.band_about(
+            squared, off, hidden, fit.hidden_share * squared
+        )
+        # A hidden mode is assumed to exist with a probability of 1/2.
+        # The stated residual therefore includes half of the hidden mode's effect beyond the solver error.
+        solver_error = SMALLEST * mode.vibration_energy(tr) / mode.vibration_energy(td)
+        beyond_solver = np.maximum(
+            max(fit.hidden_share - SMALLEST, 0.0) * opposed, decayed - solver_error
+        )
+        notable = np.maximum(beyond_solver - _HARMLESS, 0.0)
+        return np.sqrt(np.square(stated_now) + notable / 2), low, high
+
+    def _compute_deviation(self, tr: Samples, td: Samples | float) -> Samples:
+        """Return the standard deviation of the squared residual for each tr (n,), due to uncertain parameters [-]."""
+        is_usual = isinstance(td, float) and td == self._td
+        pairs = self._pairs_at_usual_td if is_usual else self._make_pairs(td)
+        deviation: Samples = np.zeros(tr.shape)
+        for above, below in pairs:
+            deviation = np.hypot(deviation, (above.compute(tr) - below.compute(tr)) / 2)
+        return deviation
+
+    @cached_property
+    def _pairs_at_usual_td(self) -> list[tuple[_SquaredResidual, _SquaredResidual]]:
+        """The result of `_make_pairs` for the usual td, which many calls ask for."""
+        return self._make_pairs(self._td)
+
+    def _make_pairs(
+        self, td: Samples | float
+    ) -> list[tuple[_SquaredResidual, _SquaredResidual]]:
+        """Return the squared residuals of the moved modes at ``td``."""
+        return [
+            (_SquaredResidual(above, td), _SquaredResidual(below, td))
+            for above, below in self._moved_modes
+        ]
+
+    @cached_property
+    def _moved_modes(self) -> list[tuple[Mode, Mode]]:
+        """Pairs of modes whose parameters deviate by one standard deviation, in independent directions.
+
+        The covariance is scaled to a unit diagonal first: its parameters have different units.
+        """
+        covariance = self._fit.covariance
+        sizes = np.sqrt(np.diag(covariance))
+        sizes[sizes == 0] = 1.0
+        values, directions = np.linalg.eigh(covariance / np.outer(sizes, sizes))
+        steps = [
+            np.sqrt(value) * sizes * direction
+            for value, direction in zip(values.tolist(), directions.T, strict=True)
+            if value > 0
+        ]
+        return [
+            (_move_parameters(self._mode, step), _move_parameters(self._mode, -step))
+            for step in steps
+        ]
 
 
-def _count_opposed(fit: Identification, tr: Samples, td: Samples | float) -> Samples:
+class _SquaredResidual:
+    """The squared residual R^2 of a mode at one td, or at a td for each tr; what depends on td is computed once."""
+
+    def __init__(self, mode: Mode, td: Samples | float) -> None:
+        self._mode = mode
+        self._amplitudes_at_td = mode.amplitudes(td)
+        self._kinetic_energy = mode.kinetic_energy(td)
+        self._energy = mode.vibration_energy(td)
+
+    def compute(self, tr: Samples) -> Samples:
+        """Return R^2 of each tr (n,) [-]."""
+        differences = (self._mode.amplitudes(tr).T - self._amplitudes_at_td.T).T
+        lost = np.sum(differences**2, axis=0) + self._kinetic_energy
+        return np.asarray(lost / self._energy)
+
+
+def _count_opposed(mode: Mode, tr: Samples, td: Samples | float) -> Samples:
     """Return the squared residual of a hidden damped mode whose deformations at tr and td are opposite extremes [-]."""
-    assert fit.mode is not None
-    return np.asarray(np.square(1 + np.exp(fit.mode.alpha / 2 * (td - tr))))
+    return np.asarray(np.square(1 + np.exp(mode.alpha / 2 * (td - tr))))
 
 
-def _count_decayed(fit: Identification, tr: Samples, td: Samples | float) -> Samples:
+def _count_decayed(
+    fit: Identification, mode: Mode, tr: Samples, td: Samples | float
+) -> Samples:
     """Return the squared residual of a mode that the fit omits at tr and that has decayed by td [-].
 
-    The deformation at tr holds its energy, which is compared with the vibration that is left at td.
+    At tr, the deformation contains the energy of this mode, which is compared with the remaining vibration energy at
+    td.
     """
-    assert fit.mode is not None
     if fit.deviations.size == 0:
         return np.zeros(tr.shape)
     energy = np.interp(tr, fit.deviation_times, fit.deviations)
-    return np.asarray(energy / fit.mode.vibration_energy(td))
-
-
-def _compute_deviation(
-    fit: Identification, tr: Samples, td: Samples | float
-) -> Samples:
-    """Return the standard deviation of the squared residual for each tr (n,), due to uncertain fitted parameters [-].
-
-    The covariance is scaled to a unit diagonal first: its parameters have different units.
-    """
-    assert fit.mode is not None
-    sizes = np.sqrt(np.diag(fit.covariance))
-    sizes[sizes == 0] = 1.0
-    values, directions = np.linalg.eigh(fit.covariance / np.outer(sizes, sizes))
-    deviation: Samples = np.zeros(tr.shape)
-    for value, direction in zip(values.tolist(), directions.T, strict=True):
-        if value <= 0:
-            continue
-        step = np.sqrt(value) * sizes * direction
-        above = _compute_squared(_move_parameters(fit.mode, step), tr, td)
-        below = _compute_squared(_move_parameters(fit.mode, -step), tr, td)
-        deviation = np.hypot(deviation, (above - below) / 2)
-    return deviation
+    return np.asarray(energy / mode.vibration_energy(td))
 
 
 def _move_parameters(mode: Mode, step: Samples) -> Mode:
@@ -119,9 +162,3 @@ def _move_parameters(mode: Mode, step: Samples) -> Mode:
     parameters[: step.size] += step
     omega, alpha, cosine, sine, plastic, preload = parameters.tolist()
     return Mode(omega, alpha, cosine, sine, mode.origin, plastic, preload)
-
-
-def _compute_squared(mode: Mode, tr: Samples, td: Samples | float) -> Samples:
-    """Return the squared residual R^2 of each tr (n,) [-]."""
-    lost = mode.separation(tr, td) + mode.kinetic_energy(td)
-    return np.asarray(lost / mode.vibration_energy(td))

@@ -1,8 +1,9 @@
-"""Refine spectral lines in noise by least squares: add those that are missing, and remove those of the noise.
+"""Refine the spectral lines of a noisy record by least squares: add missing lines, and remove those fitted to noise.
 
-The poles of shift invariance (`lines`) are not those of the smallest misfit.  A line that dies early is weak in the
-whole record, so noise may take its place in the subspace, although the first part of the record shows it; and a line
-that stands out of the misfit is none of noise.  A line counts if the misfit is smaller with it than by chance alone.
+The poles that follow from shift invariance (`lines`) do not minimise the misfit. A line that decays early is weak in
+the whole record, so noise may replace it in the signal subspace, although the first part of the record shows it. A line
+that clearly exceeds the rest of the misfit is not noise. A line is kept or added only if it reduces the misfit by more
+than chance would.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ _MOST_STEPS: Final = 6
 _STEP_LENGTHS: Final = (1.0, 0.5, 0.25)
 # The refinement ends if a step raises twice the logarithm of the likelihood by less than this [-].
 _CONVERGED: Final = 0.1
-# Largest factor by which a step may raise the sum of the heights; lines that cancel each other are fitted to noise [-].
+# Largest growth factor of the sum of heights in a step [-]; large lines that cancel out would be fitted to noise.
 _MOST_INFLATED: Final = 1.1
 # Relative damping of the normal equations, which would be singular if two lines are almost equal [-].
 _DAMPING: Final = 1e-9
@@ -54,14 +55,14 @@ _MOST_DECAY: Final = 8.0
 _MOST_OF_REST: Final = 3
 # Number of points per cycle over the record at which the spectrum of a misfit is evaluated.
 _FINER: Final = 2
-# Lines are searched for only above this frequency; slower changes belong to the mean [cycles over the record].
+# Lines are searched for only above this frequency [cycles over the record]; slower changes belong to the mean.
 _OF_MEAN: Final = 1.0
 
 
 def refine_prediction(grid: Grid, prediction: Prediction) -> Prediction:
     """Return the prediction with refined lines of the whole record, if these lines leave only noise as the misfit.
 
-    The lines of the first part stay the same, since they only test the others.
+    The lines of the first part are not refined, because they only serve to test the others.
     """
     spectrum = prediction.spectrum
     if spectrum.error <= PERFECT * prediction.swing or not spectrum.lines.poles.size:
@@ -135,7 +136,7 @@ def _try_steps(grid: Grid, spectrum: Spectrum, step: Complex) -> Iterator[Spectr
 
 
 def _sum_sizes(spectrum: Spectrum) -> float:
-    """Return the sum of the heights of all lines at the first time [energy]."""
+    """Return the sum of the heights of all spectral lines at the first sample [energy]."""
     return float(np.abs(spectrum.lines.weights).sum())
 
 
@@ -144,11 +145,14 @@ def _list_missing_poles(
 ) -> list[complex]:
     """Return the poles of the first part's lines that the record's lines do not contain, strongest lines first."""
     lines = of_first_part.lines
-    apart = np.abs(np.subtract.outer(lines.poles.imag, spectrum.lines.poles.imag))
-    is_missing = apart.min(axis=1) * grid.span > 2 * np.pi * _SAME_LINE
+    rates = lines.poles.imag
+    apart = np.abs(np.subtract.outer(rates, spectrum.lines.poles.imag))
+    nearest = apart.min(axis=1) * grid.span
+    is_missing = nearest > 2 * np.pi * _SAME_LINE
     strongest_first = np.argsort(-np.abs(lines.weights))
-    poles = lines.poles[strongest_first][is_missing[strongest_first]]
-    return [complex(pole) for pole in poles]
+    poles = lines.poles[strongest_first]
+    missing_poles = poles[is_missing[strongest_first]]
+    return [complex(pole) for pole in missing_poles]
 
 
 def _add_line(grid: Grid, spectrum: Spectrum, pole: complex) -> Spectrum | None:
@@ -183,12 +187,13 @@ def _get_needed_gain(grid: Grid) -> float:
 def _compute_gain(spectrum: Spectrum, better: Spectrum) -> float:
     """Return twice the increase of the logarithm of the likelihood if the misfit is white noise [-].
 
-    Each parameter takes a state from those that show what the misfit is.
+    Each parameter reduces the number of independent states from which the misfit is computed by one.
     """
     least = max(better.error, 1e-300)
     parameters = _OF_A_LINE * better.lines.poles.size + better.mean.poles.size
     freedom = max(better.rest.size - parameters, 1)
-    return float(2 * freedom * np.log(max(spectrum.error, least) / least))
+    reduction = max(spectrum.error, least) / least
+    return float(2 * freedom * np.log(reduction))
 
 
 class _Candidate(NamedTuple):

@@ -84,9 +84,9 @@ class SpanSearch(NamedTuple):
     bounds : Span
         The part of the record to search [time].
     oscillator : Mode, optional
-        Compared with the samples, instead of an oscillator that is fitted to them.
+        Given oscillator, which is compared with the samples; if it is None, an oscillator is fitted.
     whole : bool
-        Try only the bounds and their part up to td, because it is known that no load acts there.
+        Try only the bounds and their part up to td, because it is known that no load acts between the bounds.
     quick : bool
         Do not compute the misfit of a refused fit.
     """
@@ -107,7 +107,7 @@ def limit_bounds(
 ) -> Span:
     """Return bounds from the end of the load ``after`` to the landing, if these times are given [time].
 
-    A given time on the other side of td cuts the bounds at td.
+    If a given time lies on the wrong side of td, the bounds end at td.
     """
     if after is not None:
         bounds = bounds._replace(start=min(after, td))
@@ -127,14 +127,14 @@ def find_oscillator(
     td : float
         [time]
     window : tuple of two times, optional
-        The window to which the oscillator is fitted, if the user gives it [time].
+        Window that the user gives for the fit of the oscillator [time].
 
     Returns
     -------
     span : Span or None
-        None when no oscillator describes the record around td or before.
+        None if no oscillator describes the record around td or before.
     fit : Identification
-        The accepted fit, with the fraction of a hidden mode, or the reason why none is accepted.
+        The accepted fit with its hidden fraction of the vibration energy, or the reason why none is accepted.
     """
     history, bounds = search.history, search.bounds
     if window:
@@ -183,15 +183,16 @@ def find_described_span(
 
     If there is none, use the last one before td.
 
-    First the search tries parts of the record, long ones first, until one oscillator describes a part.  Then the window
-    grows both ways while the samples follow the fit, is fitted anew, and so on until it no longer changes.
+    The search first tries parts of the record, longest first, until an oscillator describes one. The window is then
+    extended in both directions as long as the samples follow the fit, and the oscillator is fitted again, until the
+    window no longer changes.
 
     Returns
     -------
     span : Span or None
-        None when no oscillator describes the record around td or before.
+        None if no oscillator describes the record around td or before.
     fit : Identification
-        Of that window; when there is none, of the bounds up to td, with the reason of its refusal.
+        Fit to that window; if there is none, the refused fit to the bounds up to td, with the reason.
     """
     up_to_td = Span(search.bounds.start, _mark(search.bounds, td))
     refused = {}
@@ -211,8 +212,8 @@ def find_longest_described(
 ) -> tuple[Span, Identification] | None:
     """Find a window that fills most of the ``bounds`` and that a single oscillator describes; None if there is none.
 
-    The window is the same for every td in it.  The search starts in the middle of the bounds, which the window
-    contains.  A smaller window is found only from its td.  ``whole`` has the same meaning as in `SpanSearch`.
+    The window is the same for every td in it, because the search starts in the middle of the bounds. A window without
+    this middle is found only if the search starts from a td in it. ``whole`` has the same meaning as in `SpanSearch`.
     """
     start, end = bounds
     middle = (start + end) / 2
@@ -260,7 +261,7 @@ def _find_reach(
 ) -> Span | None:
     """Return the window of a fit, extended from its middle if the anchor lies in the window.
 
-    Many td share one span; starting from the middle of the window gives all of them the same span.
+    Many td share one window; since the extension starts from its middle, all of them get the same result.
     """
     span = find_span(history, (fit.start + fit.end) / 2, fit, bounds)
     if span is not None and span.start <= anchor <= span.end:
@@ -273,7 +274,8 @@ def find_span(
 ) -> Span | None:
     """Find the window around ``anchor`` [time], within ``bounds``, in which the record follows ``fit``.
 
-    The window ends where the energy deviates from the fit; None if it deviates at the anchor itself.
+    The window ends where the energy deviates from the fit. The result is None if the energy deviates at the anchor
+    itself.
     """
     assert fit.mode is not None
     return _find_span_of_mode(history, anchor, bounds, fit.mode, fit.rms, fit.structure)
@@ -335,7 +337,7 @@ def _find_first_off(
 ) -> int | None:
     """Return the index of the first mean, at or after the index ``first``, that exceeds its limit; None if none does.
 
-    The search goes outwards block by block, so that no sum contains the large errors beyond the end of the window.
+    The search proceeds outwards block by block, so that no sum contains the large errors beyond the end of the window.
     """
     for begin in range(first, time.size, BLOCK):
         inside = slice(max(begin - behind, 0), begin + BLOCK + ahead)
@@ -441,8 +443,8 @@ def _clear_ends(
 ) -> tuple[Span, Identification]:
     """Cut off half a period at each end at which the record leaves the fit, and fit the rest again.
 
-    There a fit may have adapted to the beginning of a contact or the end of a load.  If the inner fit follows its
-    samples much better, it determines the window.
+    Near its ends, a fit may have adapted to the beginning of a contact or the end of a load. If the fit without the
+    ends follows its samples much better, it determines the window.
     """
     assert fit.mode is not None
     bounds = search.bounds
@@ -463,15 +465,15 @@ def _clear_ends(
 def estimate_hidden_share(time: Samples, energy: Samples, mode: Mode) -> float:
     """Return the fraction of the vibration energy that a further mode hidden in the misfit may have [-].
 
-    This share is the energy of a mode that makes the strongest line of the rest and decays like the vibration, at most
+    It is the energy of a mode that decays like the vibration and causes the strongest line of the misfit; it is at most
     1.
 
     Parameters
     ----------
     time, energy : array of shape (n,)
-        The window that was fitted [time], [energy].
+        The states in the fitted window [time], [energy].
     mode : Mode
-        The fit.
+        The fitted mode.
     """
     span = float(time[-1] - time[0])
     count = min(time.size - 1, _MOST_LINES)
@@ -493,20 +495,20 @@ def measure_deviations(
 ) -> tuple[Samples, Samples]:
     """Return times [time], and by how much the energy near each time deviates from the fit beyond noise.
 
-    A further mode that decays fast is hidden in the misfit of the whole record, but not in its first periods.  Each
-    deviation is the largest mean over a quarter of a period of the energy, within one such period.
+    A further mode that decays fast is hidden in the misfit of the whole record, but not in that of its first periods.
+    Each deviation is that of one energy period: the largest of the mean misfits over its quarters.
 
     Parameters
     ----------
     time, energy : array of shape (n,)
-        The window that was fitted [time], [energy].
+        The states in the fitted window [time], [energy].
     fit : Identification
-        Accepted.
+        An accepted fit.
 
     Returns
     -------
     times, deviations : array of shape (d,)
-        [time], [energy], not negative.
+        Times [time], and the deviations near them [energy], which are not negative.
     """
     assert fit.mode is not None
     period = np.pi / fit.mode.omega

@@ -1,8 +1,9 @@
 """Determine the sign of a deformation whose energy returns to its minimum in each half cycle, whatever the spring law.
 
-Each of these minima is a passage through zero: the energy above the floor is elastic, and its root is the deformation,
-which changes its sign there.  Plastic work raises the floor; heat and drift move it slowly.  If the minima do not lie
-on a smooth floor, another mode has energy there, and swings cannot be counted.
+At each of these minima the deformation passes through zero: the energy above the floor (the lower envelope of the
+energy) is elastic, and its root is the deformation, which changes its sign at the minimum. Plastic work raises the
+floor; heat and drift move it slowly. If the minima do not lie on a smooth floor, another mode has energy at these
+times, and half cycles cannot be counted.
 """
 
 from __future__ import annotations
@@ -55,13 +56,13 @@ class Swings(SignedAmplitudes):
     Parameters
     ----------
     time, deformation : array of shape (n,)
-        [time], [sqrt(energy)]; the sign as a whole is arbitrary.
+        States of the flight [time], [sqrt(energy)]; the overall sign is arbitrary.
     unclear : array
         Times at which the sign may or may not change. Times on different sides of such a time cannot be compared.
     envelope : Envelope
         Estimate of the vibration energy.
     bottoms, floor : array of shape (k,)
-        The minima [time], and the energy there.
+        Times of the minima [time], and the energy at them [energy].
     """
 
     time: Samples
@@ -115,7 +116,7 @@ class Swings(SignedAmplitudes):
     ) -> tuple[Samples, Samples, Samples]:
         """Return the residual of each tr (n,) with its bounds, which allow for an unknown spring law and hidden modes.
 
-        A hidden mode is as likely as none, so half of its energy is stated.
+        A hidden mode is as likely as none, so the residual includes half of its energy.
         """
         hidden_share = self.unseen(tr, td)
         hidden = np.minimum(
@@ -129,8 +130,8 @@ class Swings(SignedAmplitudes):
     def unseen(self, tr: Samples | float, td: float) -> Samples:
         """Return the fraction of vibration energy at td of a mode hidden in the lower envelope, for each tr (n,) [-].
 
-        It follows from the variation of the floor about its line, for heat and drift move the floor slowly; a floor of
-        almost nothing hides no more than itself.
+        It follows from the deviations of the floor from a straight line, because heat and drift move the floor slowly.
+        It is at most the largest energy of the floor itself.
         """
         first = np.clip(np.searchsorted(self.bottoms, np.atleast_1d(tr)) - 1, 0, None)
         last = int(np.searchsorted(self.bottoms, td)) + 1
@@ -202,26 +203,29 @@ def count_swings(time: Samples, energy: Samples) -> Swings | None:
 def _is_beat(bottom: Samples, floor: Samples, top: Samples, peak: Samples) -> bool:
     """Return True if half cycles alternate as in the beat of two modes with frequency ratios 2:3, 2:5 or 2:7.
 
-    The minima of a beat can all lie on one level.  The deformation of a single mode stays longer on the side of its
-    preload and goes farther there, by equal shares.  In a beat the longer swing is the lower one, or the swings differ
-    much more in length than in height.
+    All minima of a beat may lie on one level. The deformation of a single mode stays longer on the side of its preload,
+    and is larger there by a similar fraction. In a beat, the longer half cycle is the lower one, or the half cycles
+    differ much more in length than in height.
 
     Parameters
     ----------
     bottom, floor : array of shape (k,)
-        The minima [time], and the energy there.
+        Times of the minima [time], and the energy at them [energy].
     top, peak : array of shape (m,)
-        The maxima between them [time], and the energy there.
+        Times of the maxima between them [time], and the energy at them [energy].
     """
     middle = (bottom[1:] + bottom[:-1]) / 2
     lasting = np.diff(bottom)
-    height = np.interp(middle, top, peak) - np.interp(middle, bottom, floor)
+    upper = np.interp(middle, top, peak)
+    lower = np.interp(middle, bottom, floor)
+    height = upper - lower
     longer = np.diff(lasting) / (lasting[1:] + lasting[:-1])
     higher = np.diff(height) / (height[1:] + height[:-1])
     # The first and the last difference have only one neighbour.
     neighbours = np.stack([longer[:-2], longer[2:]])
     longer, higher = longer[1:-1], higher[1:-1]
-    alternating = (np.abs(longer) > _UNEVEN) & np.all(longer * neighbours < 0, axis=0)
+    is_uneven = np.abs(longer) > _UNEVEN
+    alternating = is_uneven & np.all(longer * neighbours < 0, axis=0)
     opposed = longer * higher < 0
     stretched = np.abs(longer) > _STRETCHED * np.abs(higher)
     beating = alternating & (opposed | stretched)
@@ -259,12 +263,13 @@ def _find_turns(energy: Samples) -> tuple[NDArray[np.intp], int]:
 
 def _extend_lines(time: Samples, x: Samples, y: Samples) -> Samples:
     """Return values on the straight lines between points, extrapolated at both ends from the two nearest points."""
+    start, end = time[0], time[-1]
     first_slope = (y[1] - y[0]) / (x[1] - x[0])
     last_slope = (y[-2] - y[-1]) / (x[-2] - x[-1])
-    first = y[0] + first_slope * (time[0] - x[0])
-    last = y[-1] + last_slope * (time[-1] - x[-1])
-    times = np.array([time[0], *x, time[-1]])
-    values = np.array([first, *y, last])
+    at_start = y[0] + first_slope * (start - x[0])
+    at_end = y[-1] + last_slope * (end - x[-1])
+    times = np.array([start, *x, end])
+    values = np.array([at_start, *y, at_end])
     return np.asarray(np.interp(time, times, values))
 
 
@@ -283,11 +288,11 @@ def _measure_off_line(x: Samples, y: Samples) -> Samples:
 class Envelope(NamedTuple):
     """An exponential through the highest peaks of an energy: ``energy`` at time ``origin``, decaying at ``rate``.
 
-    Below ``floor`` [energy] it does not exceed the solver's error.
+    An envelope below ``floor`` [energy] does not exceed the error of the solver.
 
-    The vibration energy V = E + T falls smoothly, as exp(-alpha t) if damping is proportional to mass, and E touches it
-    when all modes stand still at once.  That is rare with several modes, so the envelope is an estimate, rather too
-    low.
+    The vibration energy V = E + T falls smoothly, like exp(-alpha t) for mass-proportional damping, and E equals V
+    whenever all modes stand still at once. This is rare with several modes, so the envelope is usually too low an
+    estimate.
     """
 
     energy: float
@@ -312,9 +317,9 @@ def find_upper_envelope(time: Samples, energy: Samples) -> Envelope | None:
 
     Notes
     -----
-    In the logarithm the exponential is a straight line; the lowest one above all points, at their mean time, is the
-    edge of their upper convex hull there.  Peaks that may be errors of the solver do not count: a floor of them below
-    a falling vibration would bend the line up.
+    On a logarithmic scale, the exponential is a straight line. The lowest line above all points is the edge of their
+    upper convex hull at their mean time. Peaks that may be errors of the solver are ignored, because they would tilt
+    the line upwards at the end of a decaying vibration.
 
     Examples
     --------

@@ -330,7 +330,7 @@ def main() -> None:
         help="keep the rows of constants that changed nothing, too",
     )
     parser.add_argument("names", nargs="*", help="parts of the names of constants")
-    options = parser.parse_args()
+    options = parser.parse_intermixed_args()
     sources = read_sources()
     rows = read_table(options.table)
     with TemporaryDirectory() as folder:

@@ -71,12 +71,14 @@ verify --tr 0.1 --td 0.37 --part box sample_data/rollover_box.matsum
 verify --tr 0.1 --td 0.37 --part box sample_data/rolloverT01.gz
 verify --tr 0.0136 --td 0.0688 sample_data/energy.csv
 verify --tr 0.0496 --td 0.1464 --part flying {data}/carT01.gz
-verify --part box sample_data/rolloverT01.gz --switched {data}/rollover_r100_T01.gz
+verify --part box sample_data/rolloverT01.gz --switched {data}/rollover_r100_T01.gz \
+    --switched {data}/rollover_r100_T02.gz --switched {data}/rollover_r100_T03.gz
 verify --energy boxIE_J sample_data/rollover.csv --switched {data}/rollover_r20.csv.gz
 verify --tr 0.0135867 --td 0.0687534 --energy IE_J {data}/oscillator_ref.csv.gz \
     --switched {data}/oscillator_d2r_13p587_68p753.csv.gz
 verify --tr 0.006 --td 0.08 --energy IE_J {data}/oscillator_ref.csv.gz --switched {data}/oscillator_d2r_6_80.csv.gz
-verify --part flying {data}/carT01.gz --switched {data}/car_all_T01.gz {data}/car_all_T02.gz {data}/car_all_T03.gz
+verify --part flying {data}/carT01.gz --switched {data}/car_all_T01.gz --switched {data}/car_all_T02.gz \
+    --switched {data}/car_all_T03.gz
 plan sample_data/energy.csv
 plan --part box sample_data/rollover_box.matsum
 plan --part box --min-rigid 0.01 sample_data/rollover_box.matsum

@@ -30,7 +30,7 @@ _NAMES: Final = {
         flight.free_fall._REACH_OF_NOISE flight.free_fall._UNSEEN flight.internal_energy._HARDLY
         flight.margin._ROUNDING flight.momentum._ROUNDED flight.rotation._VANISHING flight.window.ROUND_OFF
         flight.window.LAST_DIGIT flight.window.VISIBLE flight.work._OF_DIGITS flight.work._OWN_ERROR
-        vibration.fitting._NO_EFFECT vibration.hidden_energy._RESOLVED vibration.modal._RESOLVED
+        vibration.fitting._NO_EFFECT vibration.hidden_energy.RESOLVED
         vibration.modal._TINY vibration.modes._EPS vibration.modes.SOLVER_FLOOR vibration.modes._ZERO
         vibration.moments._ZERO vibration.moments._ROUNDING_DEVIATIONS vibration.oscillator._SMALLEST
         vibration.oscillator._LARGEST vibration.span.SMALLEST
@@ -101,7 +101,7 @@ _NAMES: Final = {
         vibration.doubts._MOST_UNSTRETCHED_AT_ALL vibration.fitting._FAR_TOO_MUCH vibration.fitting._DRIFT
         vibration.fitting.MAX_STRUCTURE vibration.fitting._BEYOND_DOUBT vibration.fitting._BEYOND_STRUCTURE
         vibration.identify.MAX_LOCAL_STRUCTURE vibration.identify.MAX_GROWTH vibration.identify.MIN_PLASTIC
-        vibration.identify.MAX_OF_SPRING vibration.identify._OF_A_PRELOAD vibration.line_scatter._MOST_SHARED
+        vibration.identify.MAX_OF_SPRING vibration.identify._OF_A_PRELOAD vibration.line_scatter.MOST_SHARED
         vibration.lines._OF_A_LINE vibration.lines._ABOVE_NOISE vibration.locked_lines.NOTABLE
         vibration.locked_lines._NOTABLE_PARTNER vibration.locked_lines.ABOVE_SCATTER
         vibration.locked_lines._EXACT_RATE vibration.locked_lines._SAME_PHASE_OF_HARMONICS

@@ -445,7 +445,7 @@ def test_where_nothing_deforms_nothing_is_chosen(
     result = run(*args, csv(0 * LOADED, 0 * LOADED + 1.9e-9))
     assert result.exit_code == 2
     assert (
-        "run.csv: nothing to judge: no internal energy exceeds 0, so nothing deforms"
+        "run.csv: nothing to judge: no internal energy exceeds 0, so nothing deforms; give a longer run"
         in result.stderr
     )
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 from click.testing import Result
 
-from d2rpick.report.findings import explain_rules
 from d2rpick.report.formats import FORMATS
+from d2rpick.report.rule_texts import explain_rules
 from d2rpick.rules import RULES
 from tests import paper
 from tests.command import BOX, ENERGY, GLSTAT, read_refusal, run, run_json

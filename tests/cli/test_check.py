@@ -612,9 +612,9 @@ def test_a_history_that_tells_no_flight_is_an_objection() -> None:
         f["message"] for f in check_report["findings"] if f["rule"] == "D2R204"
     )
     assert (
-        "the history does not show when the load ends; "
-        "give that time with --after (in Python: after)"
-    ) in message
+        "the history does not show when the load ends; give that time with --after"
+        in message
+    )
     assert "D2R204" not in list_rules(
         run_json("check", "main.k", "--history", "rising.csv", "--after", "0.2")
     )
@@ -632,6 +632,45 @@ def test_a_history_without_energy_is_an_objection() -> None:
         "0.1",
     )
     assert [f["message"] for f in check_report["findings"] if f["rule"] == "D2R201"]
+
+
+@pytest.mark.parametrize("history", [ENERGY, GLSTAT])
+def test_a_part_that_is_rigid_in_the_whole_run_is_not_judged_by_time(
+    history: str,
+) -> None:
+    deck = place("main.k", HEAD + PARTS + "*DEFORMABLE_TO_RIGID\n         1\n" + END)
+    result = run_json("check", deck, "--history", history, "--select", "D2R2,D2R3")
+    assert list_rules(result) == ["D2R302"]
+    (message,) = (finding["message"] for finding in result["findings"])
+    assert message.endswith("not judged by time")
+    assert "--history" not in run("check", deck).stdout.split("next")[1].split("\n0")[0]
+
+
+def test_a_line_of_the_other_list_is_no_second_mistake_of_wrong_counts() -> None:
+    """The counts say two D2R lines and one R2D line; the second line has the PTYPE of an R2D line."""
+    card = write_automatic_card(1, "0.02", rigid=["1"])
+    back = write_automatic_card(2, "0.09", deformable=["1"])
+    wrong = back.replace("0.0         0         1", "0.0         2         1")
+    deck = place("main.k", HEAD + PARTS + card + wrong + END)
+    assert list_rules(run_json("check", deck, "--select", "D2R0,D2R1")) == ["D2R001"]
+
+
+def test_the_step_after_a_good_check_names_the_judged_parts() -> None:
+    cards = write_automatic_card(1, "0.123689", rigid=["1", "2"])
+    back = write_automatic_card(2, "0.37", deformable=["1", "2"])
+    deck = place("run/main.k", cards + back)
+    text = run("check", deck, "--history", MATSUM, "--select", "D2R2").stdout
+    assert f"verify --switched run --part 1,2 {MATSUM}" in " ".join(text.split())
+
+
+def test_a_part_that_is_rigid_from_the_start_is_judged_by_its_td() -> None:
+    back = write_automatic_card(2, "0.0687534", deformable=["1"])
+    cards = "*DEFORMABLE_TO_RIGID\n         1\n" + back
+    deck = place("main.k", HEAD + PARTS + cards + END)
+    result = run_json("check", deck, "--history", ENERGY, "--select", "D2R2,D2R3")
+    messages = {entry["rule"]: entry["message"] for entry in result["findings"]}
+    assert {"D2R201", "D2R202"} & {*messages}
+    assert "not judged" not in messages["D2R302"]
 
 
 def test_td_after_the_next_contact_is_named_at_td() -> None:

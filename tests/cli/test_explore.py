@@ -18,7 +18,7 @@ from tests.energies import require
 from tests.json_schemas import run_json_checked
 
 WINDOW = ("--td-window", "0.06", "0.07", "--steps", "10")
-SCHEMA = json.loads((ROOT / "d2rpick/schemas/explore-1.json").read_text("utf-8"))
+SCHEMA = json.loads((ROOT / "d2rpick/schemas/explore-2.json").read_text("utf-8"))
 
 
 @pytest.mark.slow
@@ -91,7 +91,7 @@ def test_the_sentence_says_what_a_step_changes() -> None:
     )
     assert "costs 2.3% of the rigid time" in near
     good = run_json("explore", "--td", "0.0687534", *WINDOW, ENERGY)["answer"]
-    assert good == "td = 0.0687534: residual 0.000. No other td in the range is better."
+    assert good == "td = 0.0687534: residual 0.000; no other td in the range is better"
 
 
 @pytest.mark.parametrize("td", ["0.03", "0.064", "0.101"])
@@ -147,7 +147,7 @@ def test_a_td_that_saves_little_is_no_step_and_the_sentence_says_so(
     )
     assert exploration["step"] is None
     assert exploration["answer"].endswith(
-        ". No other td in the range halves this error without giving up more than half of the rigid time."
+        "; no other td in the range halves this error without giving up more than half of the rigid time"
     )
 
 

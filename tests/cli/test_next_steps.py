@@ -1,5 +1,6 @@
 """The next step named in an answer works, and messages name only what the user gave."""
 
+import html
 import re
 import shlex
 from pathlib import Path
@@ -8,6 +9,7 @@ import pytest
 
 from d2rpick.choice.pair.grades import VERDICTS
 from d2rpick.choice.pair.quality import Cause, Grade, Quality, omit_comparison
+from tests import variants
 from tests.command import (
     BOX,
     ENERGY,
@@ -15,6 +17,7 @@ from tests.command import (
     ROLLOVER,
     ROOT,
     join_wrapped_lines,
+    put,
     run,
     run_json,
 )
@@ -226,7 +229,9 @@ def test_the_next_command_can_be_typed_as_it_stands(
 def test_the_shortest_way_to_a_card_of_connected_parts_merges_them(
     arguments: tuple[str, ...], tmp_path: Path
 ) -> None:
-    text = find_line("next", *arguments)
+    copy = put(tmp_path / "matsum", Path(MATSUM).read_bytes())
+    of_copy = (str(copy) if word == MATSUM else word for word in arguments)
+    text = find_line("next", *of_copy)
     assert "without it, parts that share nodes become separate rigid bodies" in text
     match = re.search(r"d2rpick (.*?) \(", text)
     assert match, text
@@ -237,6 +242,24 @@ def test_the_shortest_way_to_a_card_of_connected_parts_merges_them(
     card = "".join([step.stdout, *written])
     assert "         2         1      PART\n" in card
     assert "CHECK BEFORE USE" not in card
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [("plan", *FLYING), ("suggest", *FLYING), ("verify", *WITH_CARE, MATSUM)],
+    ids=" ".join,
+)
+def test_the_deck_next_to_a_history_is_named_in_the_next_command(
+    arguments: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    text = find_line("next", *arguments)
+    assert f"--deck {DECK}" in text
+    match = re.search(r"d2rpick (.*?)(?:\. Then|$)", text)
+    assert match, text
+    step = run(*shlex.split(match[1]))
+    written = [path.read_text() for path in Path("switched").glob("*.k")]
+    assert "         2         1      PART\n" in "".join([step.stdout, *written])
 
 
 def test_a_card_whose_parts_may_share_nodes_says_so_in_its_text() -> None:
@@ -414,7 +437,8 @@ def test_a_plan_of_short_flights_asks_for_shorter_windows_only_once() -> None:
     assert step == f"plan shorter windows too with d2rpick {shlex.join(shorter)}"
     assert "plan" not in find_line("next", *shorter)
     last = find_line("next", "plan", "--min-rigid", "0.002", *given, ENERGY)
-    assert last.startswith("no pair of this run can be used: every flight is too short")
+    assert last.startswith("no pair of this run can be used with --after 0.01, ")
+    assert "--min-rigid 0.002 (other values may allow one): every flight is" in last
 
 
 def test_the_step_of_a_plan_without_a_mass_is_not_another_tour() -> None:
@@ -462,9 +486,14 @@ def test_a_tr_during_the_load_is_named_as_the_only_reason() -> None:
 
 
 @pytest.mark.parametrize("deck", [(), ("--deck", str(SAMPLES / "switching.k"))])
-def test_parts_without_its_deck_asks_for_the_deck(deck: tuple[str, ...]) -> None:
+def test_parts_without_its_deck_asks_for_the_deck(
+    deck: tuple[str, ...], tmp_path: Path
+) -> None:
     step = find_line("next", "parts", *deck, MATSUM)
-    assert f"d2rpick parts --deck DECK {MATSUM}" in step
+    assert step.endswith(f"d2rpick parts --deck {DECK} {MATSUM}")
+    copy = str(put(tmp_path / "matsum", Path(MATSUM).read_bytes()))
+    step = find_line("next", "parts", *deck, copy)
+    assert f"d2rpick parts --deck DECK {copy}" in step
     assert "switching.k" not in step
 
 
@@ -499,7 +528,11 @@ def test_without_a_pair_the_better_one_is_that_of_its_flight() -> None:
 
 def test_a_plan_against_the_verdict_says_so() -> None:
     question = ("plan", "--part", "box", "--min-quality", "poor", MATSUM)
-    assert run(*question).stdout.startswith("do not use: planned nevertheless")
+    text = join_wrapped_lines(run(*question).stdout)
+    assert text.startswith("do not use: rigid from ")
+    assert "is planned only because of --min-quality poor" in text
+    # The next step is the same as without the option; it does not lead to the cards.
+    assert "-f card" not in find_line("next", *question)
 
 
 def test_a_study_of_pairs_that_cannot_be_used_fails_as_suggest_does() -> None:
@@ -533,3 +566,129 @@ def test_a_cure_is_given_once() -> None:
     times = ("--tr", "0.0001", "--td", "0.1", "--part", "all")
     text = run("verify", *times, str(SAMPLES / "oscillator" / "OSCT01.gz")).stdout
     assert "write the energies more often; write" not in " ".join(text.split())
+
+
+# A study leads to a better td of all runs, and gives a shared reason once.
+
+
+def test_a_study_at_a_poor_td_leads_to_the_better_td_of_all_runs() -> None:
+    runs = (ENERGY, str(SAMPLES / "energy.glstat"))
+    step = find_line("next", "study", "--td", "0.064", *runs)
+    better = run_json("suggest", "--td", "0.064", ENERGY)["better_td"]["td"]
+    expected = ("d2rpick", "study", "--td", f"{better:.6g}", *runs)
+    assert step == f"judge all runs at the better td with {shlex.join(expected)}"
+    followed = run(*expected[1:])
+    assert followed.stdout.startswith("use ")
+    assert "-td" not in find_line("td", *expected[1:])
+
+
+def test_a_study_gives_reasons_that_differ_only_in_numbers_once(tmp_path: Path) -> None:
+    runs = variants.write_variants(tmp_path)
+    text = join_wrapped_lines(run("study", "--td", "0.064", *runs).stdout)
+    (shared,) = re.findall(r"why (do not use in \d runs?: .*?) next ", text)
+    assert shared.startswith(f"do not use in {len(runs)} runs: ")
+    assert f"(numbers of {runs[0]})" in shared
+
+
+# A plan gives its reason in the first lines.
+
+
+@pytest.mark.parametrize(
+    "question",
+    [
+        (ENERGY,),
+        ("--part", "1,2", MATSUM),
+        ("--part", "box", MATSUM),
+        ("--part", "box", "--min-quality", "poor", MATSUM),
+    ],
+)
+def test_a_plan_gives_the_reason_of_suggest_in_its_first_lines(
+    question: tuple[str, ...],
+) -> None:
+    reason = find_line("why", "suggest", *question)
+    assert find_line("why", "plan", *question) == reason
+    first_lines = run("plan", *question).stdout.partition("\nnext")[0]
+    assert "why" in first_lines
+
+
+def test_a_flight_that_is_too_short_has_no_other_verdict() -> None:
+    question = ("plan", "--min-rigid", "0.3", BOX)
+    rows = re.findall(r"^ +\d .*", run(*question).stdout, re.MULTILINE)
+    assert rows
+    assert all("too short" in row and "use" not in row for row in rows)
+    assert "every flight is too short" in find_line("why", *question)
+    assert "with --min-rigid 0.3 (another value may allow one)" in find_line(
+        "next", *question
+    )
+
+
+# Commands that follow each other do not contradict each other.
+
+
+@pytest.mark.parametrize("history", [EXCEL, "loaded"])
+def test_info_does_not_offer_a_run_that_suggest_refuses(
+    history: str, request: pytest.FixtureRequest
+) -> None:
+    name = history if history == EXCEL else request.getfixturevalue(history)
+    assert run_json("suggest", name)["verdict"] == "do not use"
+    overview = run_json("info", name)
+    assert overview["verdict"] == "do not use"
+    assert "gravity or another load" in overview["verdict_reason"]
+    assert "write the mass" in find_line("to improve", "info", name)
+
+
+@pytest.mark.parametrize(("tr", "td"), [("0.02", "0.2"), ("0.05", "0.36")])
+def test_the_findings_of_check_name_the_pair_of_the_verdict(
+    tr: str, td: str, tmp_path: Path
+) -> None:
+    card = run("card", "--tr", tr, "--td", td, "--part", "1,2").stdout
+    deck = put(tmp_path / "main.k", card)
+    question = ("check", str(deck), "--history", MATSUM, "--select", "D2R2")
+    report = run_json(*question)
+    cures = {window["cure"] for window in report["windows"]}
+    (pair,) = {tuple(re.findall(r"t[rd] = ([0-9.]+)", cure)) for cure in cures}
+    assert report["findings"]
+    for finding in report["findings"]:
+        named = re.search(r"use td = ([0-9.]+) with tr = ([0-9.]+)", finding["message"])
+        assert named is None or (named[2], named[1]) == pair
+
+
+# The page of an answer gives its next step.
+
+
+@pytest.mark.parametrize(
+    "question",
+    [
+        ("suggest", "--td", "0.064", ENERGY),
+        ("suggest", "--td", "0.0687534", ENERGY),
+        ("verify", "--tr", "0.0128853", "--td", "0.064", ENERGY),
+        ("verify", "--tr", "0.0135867", "--td", "0.0687534", ENERGY),
+        ("explore", "--td", "0.064", "--steps", "3", ENERGY),
+        ("plan", ENERGY),
+    ],
+    ids=" ".join,
+)
+def test_a_page_gives_the_next_step_of_its_answer(
+    question: tuple[str, ...], tmp_path: Path
+) -> None:
+    page = tmp_path / "page.html"
+    run(*question, "--report", str(page))
+    (step,) = re.findall(
+        r"<dt>next</dt><dd>(.*?)</dd>", page.read_text(encoding="utf-8")
+    )
+    assert html.unescape(step) == find_line("next", *question)
+
+
+# The better pair that verify names has no better pair itself.
+
+
+@pytest.mark.parametrize(("tr", "td"), [("0.006", "0.08"), ("0.02", "0.064")])
+def test_the_better_pair_of_verify_is_good_at_once(tr: str, td: str) -> None:
+    verdict = run_json("verify", "--tr", tr, "--td", td, ENERGY)
+    named = re.search(r"td = ([0-9.]+)", verdict["cure"])
+    assert named
+    followed = run_json("suggest", "--td", named[1], ENERGY)
+    assert (followed["verdict"], followed["cure"]) == ("use", "")
+    # A row of the candidates at this td names the same pair.
+    candidates = run_json("suggest", "--td", td, ENERGY)["candidates"]
+    assert verdict["cure"] in {row["cure"] for row in candidates}

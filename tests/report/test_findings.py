@@ -8,7 +8,8 @@ from xml.etree import ElementTree as ET
 import pytest
 from hypothesis import given, strategies as st
 
-from d2rpick.report import findings as report, formats
+from d2rpick.api.checking import Findings
+from d2rpick.report import formats, rule_texts
 from d2rpick.rules import RULES, Checked, check_deck
 from d2rpick.rules.base import Finding, Severity
 from d2rpick.rules.rule import END, GOOD, HEAD, PARTS, write_automatic_card
@@ -42,7 +43,7 @@ def write_findings(
     return formats.write(
         "findings",
         form,
-        report.Checks(results, str(root), fail_on=fail_on),
+        Findings(results=results, root=str(root), fail_on=fail_on),
         formats.DisplayOptions(),
     )
 
@@ -163,7 +164,7 @@ def test_only_a_deck_of_another_name_is_named() -> None:
         for rule in RULES.values()
         for name in re.findall(
             r"^\w+, as (\S+):$",
-            report.explain_rule(rule, 100, with_examples=True),
+            rule_texts.explain_rule(rule, 100, with_examples=True),
             re.MULTILINE,
         )
     ]

@@ -24,7 +24,7 @@ def test_of_many_parts_the_first_are_named() -> None:
     assert name_energy(history) == "internal energy of p1, p3, p4, p5, p6 and 2 more"
     assert (
         describe_input(history)
-        == f"run: matsum, {name_energy(history)}, 5 states, 0 to 1"
+        == f"run: matsum, {name_energy(history)}, 5 states, 0 to 1 (units of the run)"
     )
 
 

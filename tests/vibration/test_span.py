@@ -11,7 +11,7 @@ from d2rpick.choice.question import Settings
 from d2rpick.histories.history import History
 from d2rpick.vibration.identify import identify, judge_given
 from d2rpick.vibration.modes import Mode
-from d2rpick.vibration.oscillator_band import residual_band
+from d2rpick.vibration.oscillator_band import OscillatorBand
 from d2rpick.vibration.span import (
     Span,
     SpanSearch,
@@ -195,7 +195,7 @@ def test_the_bound_holds_for_a_mode_that_drowns_in_noise() -> None:
             compute_replayed_residual(truth, tr, td),
             compute_replayed_residual(mode, tr, td),
         )
-        _, low, high = residual_band(fitted, predicted, tr, td)
+        _, low, high = OscillatorBand(fitted, td).bound_residual(predicted, tr, td)
         assert np.all(high > true - 0.05)
         assert np.all(low < true + 0.05)
 
@@ -279,9 +279,9 @@ def test_the_band_holds_for_a_mode_that_dies_early() -> None:
     true = compute_replayed_residual(modes, tr, td)
     stated = compute_replayed_residual(mode, tr, td)
     assert true[0] > 0.5 > stated[0]
-    _, _, high_before = residual_band(fit, stated, tr, td)
+    _, _, high_before = OscillatorBand(fit, td).bound_residual(stated, tr, td)
     assert high_before[0] < true[0]
-    stated_now, low, high = residual_band(judged, stated, tr, td)
+    stated_now, low, high = OscillatorBand(judged, td).bound_residual(stated, tr, td)
     assert np.all((low <= true + 1e-3) & (true <= high + 1e-3))
     assert stated_now[0] == pytest.approx(true[0], abs=0.3)
     assert stated_now[1] == pytest.approx(stated[1], abs=1e-9)

@@ -85,25 +85,30 @@ class Reproduction(NamedTuple):
 
 
 _PAIR: Final = Kind(
-    row(*(Field(key, "number") for key in ("tr", "td", "residual"))).schema,
+    row(
+        keys.TR,
+        keys.TD,
+        Field("residual", "number", "residual computed in closed form"),
+    ).schema,
     lambda pair: {"tr": pair[0], "td": pair[1], "residual": compute_residual(pair)},
     "pair",
 )
 _ROW: Final = row(
-    Field("what", "text"), Field("unit", "text"),
+    Field("what", "text", "quantity"), Field("unit", "text", "unit of the quantity"),
     Field("published", "number?", "value in the paper; null if the paper gives none"),
     Field("reference", "number?", "reference value, computed in another way (see source)"),
-    Field("here", "number"),
+    Field("here", "number", "computed value"),
     Field("difference", "number", "computed value minus published value; minus the reference value if nothing is "
                                   "published"),
-    Field("tolerance", get_kind("number", minimum=0)),
+    Field("tolerance", get_kind("number", minimum=0), "largest absolute difference at which the values agree"),
     Field("source", "text", "source of the published value or of the reference value"),
     Field("agrees", "flag", "true if the difference is within the tolerance"),
     Field("section", get_kind("integer", minimum=1, maximum=5), "section of the paper", later=True),
     Field("figure", "text", "number of the figure in the paper", later=True),
 )  # fmt: skip
 _FIGURE: Final = row(
-    Field("name", "text"), Field("title", "text"), Field("section", get_kind("integer", minimum=1, maximum=5)),
+    Field("name", "text", "name of the figure and of its file"), Field("title", "text", "title of the figure"),
+    Field("section", get_kind("integer", minimum=1, maximum=5), "section of the paper"),
     Field("figure", "text", "number of the figure in the paper"),
     Field("paper", "text", "result in the paper"),
     Field("found", "text", "result computed here"),
@@ -116,12 +121,22 @@ DOCUMENT: Final = Document(
     "Published and computed results of the floating oscillator; times of pairs in seconds.",
     row(
         keys.WARNINGS._replace(get=lambda _: ()),
-        Field("rows", many(_ROW)),
-        Field("published", _PAIR, get=lambda _: PUBLISHED),
-        Field("better", _PAIR, get=lambda _: find_pair_at_peak()),
-        Field("figures", many(_FIGURE), get=lambda answer: answer.exhibits),
-        Field("misprints", "texts"),
-        Field("files", "texts"),
+        Field("rows", many(_ROW), "values of the paper, compared with computed values"),
+        Field("published", _PAIR, "pair in the paper", lambda _: PUBLISHED),
+        Field(
+            "better",
+            _PAIR,
+            "pair whose td is the next energy peak after the published td",
+            lambda _: find_pair_at_peak(),
+        ),
+        Field(
+            "figures",
+            many(_FIGURE),
+            "figures of the paper, compared with computed figures",
+            lambda answer: answer.exhibits,
+        ),
+        Field("misprints", "texts", "misprints in the equations of the paper"),
+        Field("files", "texts", "files written"),
     ),
 )
 

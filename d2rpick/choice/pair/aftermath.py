@@ -5,7 +5,7 @@ energy S and the vibration energy U of the reference run at td, the ratio of the
 
 .. math:: \frac{S + V(t_r)/2}{S + U(t_d)/2}
 
-The fluctuation of the energy in the flight bounds U, and with it S.
+The fluctuation of the energy in the flight gives bounds of U, and thereby of S.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ def _compute_mean_ratio(
 ) -> float:
     """Return the mean energy after td relative to the reference run [-].
 
-    ``elastic_td`` and ``whole`` are the elastic and the whole vibration energy at td [energy].
+    ``elastic_td`` is the elastic part of the vibration energy at td, and ``whole`` all of it [energy].
     """
     static = max(energy_td - elastic_td, 0.0)
     reference = static + whole / 2
@@ -114,7 +114,8 @@ def _bound_vibration_energies(situation: Situation) -> list[tuple[float, float]]
 def bound_vibration_energy(situation: Situation) -> tuple[float, float] | None:
     """Return the smallest and largest vibration energy that can cause the energy fluctuations in the flight [energy].
 
-    No vibration fluctuates by more than its energy; many modes out of step fluctuate by much less.
+    The fluctuation of the internal energy never exceeds the vibration energy, and many modes with random phases cause a
+    much smaller fluctuation.
     """
     time, energy = select_energies_in_flight(situation)
     if time.size < _FEWEST_STATES:

@@ -1,6 +1,6 @@
 """Find the candidates for tr at a given td, and judge them by their accuracy and the objections to them.
 
-All candidates are judged at once, as columns; a `Candidate` is made only when it is looked up.
+All candidates are judged together, as columns; a `Candidate` is built only when it is accessed.
 """
 
 from __future__ import annotations
@@ -46,15 +46,16 @@ class Candidate(Measured, Record):
     Times have the unit of the history; ``level_error``, ``lock_in_error``, ``residual`` and ``rigid_fraction`` have no
     unit.  ``kind`` is "crossing" of the level, "extremum" near the level, "match" of the deformations of several modes,
     "start" of a flight in which nothing vibrates, or "given" for a pair to be verified.  ``level_ratio`` is
-    E(tr)/E(td).  ``admissible``: the tr lies in the flight, with the sign of td and an error within the tolerance;
-    otherwise ``notes`` give the reasons.  ``acceptable``: admissible, with a residual of at most 0.5.
-    ``run_time_share`` is the expected run time over that of the reference run.  ``same_swing``: the energy turns less
-    than twice from tr to td, so that hardly anything is saved.  ``residual_high`` is the largest residual if what the
-    model does not explain is a further mode.  ``position_error`` is the distance of a body from its place at td
-    [length], because ``position_error_part`` is frozen elsewhere.  Of several bodies it is the largest;
-    ``position_error_body`` lists the parts of that body.  ``position_error_assumes`` names the assumption made if no
-    deck defines which parts become one body.  ``position_error_is_lower_bound``: the error may be larger, through
-    internal motion that looks like rotation of the body.
+    E(tr)/E(td). ``admissible`` is True if tr lies in the flight, and the deformation has the same sign as at td and an
+    error within the tolerance; otherwise ``notes`` lists the reasons. ``acceptable`` is True if the candidate is
+    admissible and its residual is at most 0.5. ``run_time_share`` is the expected run time divided by that of the
+    reference run. ``same_swing`` is True if the energy has fewer than two extrema between tr and td, so that hardly
+    anything is saved. ``residual_high`` is the residual if the part of the energy that the model does not explain is a
+    further mode. ``position_error`` is the distance of a body from its correct position at td [length], because
+    ``position_error_part`` is frozen in a different position. For several bodies, it is the largest distance, and
+    ``position_error_body`` lists the parts of this body. ``position_error_assumes`` states the assumption that is made
+    if no deck defines which parts become one body. ``position_error_is_lower_bound`` is True if the error may be
+    larger, because internal motion may look like rotation of the body.
     """
 
     rank: int
@@ -90,8 +91,8 @@ class Candidate(Measured, Record):
 class Pair(NamedTuple):
     """A recommended pair of times (tr, td) [time].
 
-    Pairs at different td are compared by ``error``, which is the ``residual`` if that is known; ``residual_high`` is
-    its upper bound.
+    Pairs at different td are compared by ``error``, which is the ``residual`` if this is known; ``residual_high`` is
+    the upper bound of the residual.
     """
 
     tr: float
@@ -111,9 +112,10 @@ class Pair(NamedTuple):
 class Judged:
     """Candidates for tr at one or many td of a record, judged by flight, deformation sign and tolerance.
 
-    All columns have shape (n,); those of one td are adjacent, in the order of ``situations``.  ``situation_of`` is the
-    index into ``situations``.  ``columns`` has the fields of a candidate by name: its measures, ``energy``,
-    ``level_error``, ``same_swing``, ``position_error`` and ``rigid_time``, NaN for unknown values.
+    All columns have shape (n,); the candidates of one td are adjacent, in the order of ``situations``. ``situation_of``
+    contains the index of the situation of each candidate. ``columns`` contains the fields of the candidates by name:
+    their measures, ``energy``, ``level_error``, ``same_swing``, ``position_error`` and ``rigid_time``; unknown values
+    are NaN.
     """
 
     situations: Sequence[Situation]
@@ -264,8 +266,8 @@ class Judged:
 class Candidates(Sequence[Candidate]):
     """A sequence of the candidates of one td in order of rank, each of which is built when it is first accessed.
 
-    ``order`` has the row numbers of the candidates in ``judged``; these are ranked if ``ranked`` is True.
-    ``recommended`` is the position of the recommended candidate in ``order``, None if there is none.
+    ``order`` contains the row numbers of the candidates in ``judged``, in order of rank if ``ranked`` is True.
+    ``recommended`` is the position of the recommended candidate in ``order``; None if there is none.
     """
 
     situation: Situation
@@ -411,9 +413,9 @@ def judge_candidates(
 ) -> Iterator[Judged]:
     """Judge all candidates before td in time order: level crossings, energy extrema near the level, closest matches.
 
-    If nothing vibrates in the flight, its start is the only candidate.  With ``in_flight``, candidates before the
-    flight may be omitted: none of them is acceptable, and noise in a long record makes tens of thousands.  All
-    situations must have the same record and rules.  Several td are judged together, up to ``most`` candidates.
+    If nothing vibrates in the flight, its start is the only candidate. If ``in_flight`` is True, candidates before the
+    flight may be omitted, because none of them is acceptable and a noisy long record has tens of thousands of them. All
+    situations must have the same record and settings. Several td are judged in one batch of up to ``most`` candidates.
     """
     first, together = 0, 1
     while first < len(situations):

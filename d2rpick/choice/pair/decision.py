@@ -1,6 +1,6 @@
 """Decide on the verdict on a pair, its reason, the expected and the worst motion after td, and a better pair.
 
-All commands, output forms and pages use the texts of this module, so that they cannot contradict each other.
+All commands, output formats and pages use the texts of this module, so that they cannot contradict each other.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ class Decision(NamedTuple):
     at_rest : bool
         True if nothing vibrates in the flight up to td.
     mean_energy_bounds : MeanEnergyBounds or None
-        Bounds of the mean energy after td over that of the reference run [-]; None if they are unknown.
+        Bounds of the mean energy after td relative to that of the reference run [-]; None if they are unknown.
     residual : float or None
         Expected residual [-].
     worst_residual : float
@@ -77,9 +77,9 @@ class Decision(NamedTuple):
     better_level : float or None
         Energy level at td of the better pair, relative to that of this pair [-]; None if it was not compared.
     cure_of_objections : str
-        What to do about the objections if there is no better pair.
+        Advice on how to remove the objections if there is no better pair.
     best_of : (float, float) or None
-        Range of td of which the pair is the best [time]; None if not all its td were compared.
+        Range of td in which this pair is the best [time]; None if not all td of the range were compared.
     is_compared : bool
         True if a finished switched run was compared with the reference run.
     """
@@ -286,10 +286,10 @@ def decide(
 ) -> Decision:
     """Return the verdict on a tr, which any of the ``objections`` makes inadmissible; ``better`` is a better pair.
 
-    ``is_admissible`` False does so without objections, if they say nothing but that the residual is too large.
-    ``best_residual`` is that of the best tr at this td [-]: if it is clearly smaller, tr is to blame.  If there is no
-    better pair, ``cure_of_objections`` says what to do about them.  ``best_of`` is the range of td of which the pair is
-    the best [time], if all were compared.
+    ``is_admissible`` is False for a pair without ``objections`` that is inadmissible only because its residual is too
+    large. ``best_residual`` is the residual of the best tr at this td [-]: if it is clearly smaller, the verdict blames
+    tr. If there is no better pair, ``cure_of_objections`` is the advice on the objections. ``best_of`` is the range of
+    td in which the pair is the best [time], if all td of the range were compared.
     """
     quality = grade_pair(situation, candidate, best_residual)
     return Decision(
@@ -310,7 +310,7 @@ def decide(
 def _find_worst_residual(situation: Situation, candidate: Candidate) -> float:
     """Return the largest residual that the record does not rule out [-]; 0 if nothing vibrates.
 
-    If the direction of the deformation is unknown, it is that of equal levels with opposite signs.
+    If the direction of the deformation is unknown, the result is the residual for equal levels with opposite signs.
     """
     if situation.at_rest:
         return 0.0

@@ -16,7 +16,8 @@ if TYPE_CHECKING:
 class MovingApart(NamedTuple):
     """The switched parts that are ``leaving`` the others in the flight, and the parts ``staying`` together.
 
-    ``staying`` is empty if every moving part flies on its own.  ``are_joined``: the deck makes one rigid body of them.
+    ``staying`` is empty if every moving part flies on its own. ``are_joined`` is True if the deck joins the switched
+    parts to one rigid body.
     """
 
     leaving: tuple[Part, ...]
@@ -32,7 +33,7 @@ class MovingApart(NamedTuple):
     def are_all_separate(self) -> bool:
         """True if every moving part flies on its own, so that there is no main body to which the others do not belong.
 
-        The flight is then that of each part, and holds if each becomes a rigid body of its own.
+        The flight is then that of each part, and remains valid if each part becomes a rigid body of its own.
         """
         return not self.staying and not self.are_joined
 

@@ -61,7 +61,7 @@ MOST_WORTH_OF_GOOD: Final = 0.01
 MOST_WORTH_OF_FAIR: Final = 0.05
 # Smallest number of states that resolve a flight; if there are fewer, a shorter output interval is proposed.
 _ENOUGH_STATES: Final = 200
-# If at least this many states lie before td, more states are not proposed as the cure.
+# More frequent output is proposed as a cure only if fewer than this number of states lie before td.
 _FEW_STATES: Final = 20
 # Largest number of parts that are named in a sentence.
 _NAMED: Final = 5
@@ -89,11 +89,12 @@ def rank_candidates(
 def rank_judged(judged: Judged) -> Iterator[Candidates]:
     """Rank and number the candidates of each td, and recommend the first candidate within the limits of the settings.
 
-    Acceptable candidates come first; of these, those on the swing of td or near td come last, since they save little.
-    In each group those of like quality come first, the earliest first; but among rigid times within 10 % of the
-    longest, those with a large position error come after the others.  Many modes have another residual at each tr.
-    There, all good pairs are of like quality; if there is no good pair, all that the band of the best leaves open are.
-    The rest follows by error.
+    There are three groups: acceptable candidates, acceptable candidates that save little because they lie near td or on
+    its half cycle, and all others. In each group, the candidates of the best quality come first, and of these the
+    earliest. But among rigid times within 10 % of the longest, candidates with a large position error come last. For
+    many modes, each tr has a different residual; all good candidates are then equally good. If none is good, all
+    candidates that may be as good as the best one, given its error band, are equally good. The other candidates follow
+    in order of error.
     """
     late = (judged.columns["same_swing"] != 0) | judged.near_td
     group = np.where(judged.acceptable, late, np.int8(2)) + 3 * judged.situation_of
@@ -140,10 +141,11 @@ def is_within_band(
 ) -> NDArray[np.bool_]:
     """Return True for each pair that may be as good as the best pair, given the error band of the best pair.
 
-    All arguments and the result have shape (n,) [-].
-    An error lies halfway from the ``expected`` residual, for the best pair ``best``, to its upper bound, in the square.
-    A pair is expected to be no worse than the error of the best one, and its own error is no worse than the upper bound
-    of that.  It is also on the same side of the limits of a grade, and of the residual of no vibration.
+    All arguments and the result have shape (n,) [-]. The square of an error lies halfway between the square of the
+    ``expected`` residual (``best`` for the best pair) and that of its upper bound. A pair is within the band if its
+    expected residual is at most the error of the best pair, and its error at most the upper bound of the best pair. In
+    addition, both must be on the same side of the residual 0.5, and of the residual 1, at which no vibration is
+    preserved.
     """
     limit = np.maximum(error_of_best, best)
     # Numpy warnings are suppressed, because infinite errors leave the bound undefined.
@@ -157,7 +159,8 @@ def is_within_band(
 class Errors(NamedTuple):
     """Errors of n candidates, shape (n,): the ``error`` by which they are ranked, and the ``expected`` error [-].
 
-    The two differ by half of the band.  ``is_good`` is True for candidates that are all equally good.
+    Their squares differ by half of the error band. ``is_good`` is True for good candidates, which are treated as
+    equally good.
     """
 
     error: Samples
@@ -174,11 +177,11 @@ def order_by_quality(
 ) -> NDArray[np.intp]:
     """Return the order of the candidates, group by group. The best candidates, which are equally good, come first.
 
-    These are the good ones.  If a group has no such pair, they are those with an error within ``room``, of shape
-    (groups,), of the smallest, or with an expected error that the band of the best leaves open; the other arguments
-    have shape (n,).  They are ordered by descending rigid time; but among rigid times within 10 % of the longest, those
-    with ``is_off`` come last, and before these those with an error further than ``room`` from the smallest.  The others
-    follow by error.
+    The best candidates of a group are the good ones. If there is none, they are the candidates whose error exceeds the
+    smallest one by at most ``room``, shape (groups,), or whose error lies within the band of the best candidate. They
+    are ordered by descending rigid time. But of the candidates whose rigid time is within 10 % of the longest, those
+    whose error exceeds the smallest by more than ``room`` come later, and those for which ``is_off`` is True come last.
+    All other candidates follow in order of error. The arguments except ``room`` have shape (n,).
     """
     error = np.round(errors.error, _DECIMALS)
     expected = np.round(errors.expected, _DECIMALS)
@@ -226,7 +229,7 @@ def _find_extremes(
 class Excess(NamedTuple):
     """A limit that a pair exceeds, or that cannot be tested because a value is unknown, with the ``message`` about it.
 
-    ``is_td_wrong`` is True if the value is known and depends on td only, so that no other tr helps.
+    ``is_td_wrong`` is True if the value is known and depends only on td, so that no other tr helps.
     """
 
     message: str
@@ -250,11 +253,11 @@ def list_exceeded_limits(
 class Cause(NamedTuple):
     """The ``reason`` why a grade is not better, and the ``cure`` that would improve the grade.
 
-    ``needs_other_times``: the cure is another tr or td.  ``is_of_record``: the cause holds for each pair of the record,
-    so other times do not help before the record or the deck is improved, or other parts are chosen.  ``kind`` is the
-    reason without the numbers of this pair, by default the reason itself; with it a table explains once what several
-    pairs have in common.  ``better_parts`` are values of `parts` with which the cause does not apply.  ``needs_deck``:
-    the deck of the run may remove the cause.
+    ``needs_other_times`` is True if the cure is a different tr or td. ``is_of_record`` is True if the cause applies to
+    each pair of the record, so that other times do not help unless the record or the deck is improved, or other parts
+    are chosen. ``kind`` is the reason without the numbers of this pair, by default the reason itself; tables state it
+    once for several pairs. ``better_parts`` contains values of `parts` for which the cause does not apply.
+    ``needs_deck`` is True if the deck of the run may remove the cause.
     """
 
     reason: str
@@ -333,8 +336,8 @@ def grade_residual(residual: float) -> str:
 class Quality(NamedTuple):
     """Two grades of a pair, for the ``motion`` and for the ``vibration`` after td. The worse grade is used.
 
-    ``alone`` is the grade of the vibration by itself.  ``worth`` may raise it: the energy of the vibration error
-    relative to the next contact, None if that is unknown.
+    ``alone`` is the grade of the vibration without regard to the next contact. ``worth``, which may raise this grade,
+    is the energy of the vibration error relative to that of the next contact; None if it is unknown.
     """
 
     motion: Grade
@@ -399,7 +402,7 @@ def grade_pair(
 ) -> Quality:
     """Grade a tr by its motion, its vibration error, and this error relative to the next contact.
 
-    ``best_residual`` is that of the best tr at this td [-], None if it is unknown or if this is the best tr.
+    ``best_residual`` is the residual of the best tr at this td [-]; None if it is unknown or if this is the best tr.
     """
     flight = situation.flight
     uncertain = () if flight.certain else (_explain_uncertain_flight(flight),)
@@ -551,7 +554,7 @@ def _describe_wrong_tr(
     elif candidate.sign_match is False:
         reason += ": the deformation has the opposite direction"
     elif best_residual > POOR_RESIDUAL:
-        # Every tr is poor, and nothing but the error itself speaks against this one.
+        # Every tr is poor, and the only reason against this tr is its error.
         return None
     best = f"the best tr at this td is wrong by {format_residual(best_residual)}"
     return Cause(
@@ -634,7 +637,7 @@ def _list_causes_for_fair(situation: Situation, best: Candidate) -> list[Cause]:
     high = best.residual_high or best.residual
     causes = []
     is_vague = high > _MOST_HIDDEN
-    # A residual that is stated above the limit, but may be below it by its band, does not make a pair worse than good.
+    # If a residual exceeds the limit but its error band does not exclude smaller values, the pair may still be good.
     is_wrong = best.residual > MOST_GOOD and (is_vague or low > MOST_GOOD)
     if is_wrong:
         worst_text = f", or {format_residual(high)} at worst" if is_vague else ""

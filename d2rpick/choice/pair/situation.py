@@ -61,16 +61,16 @@ def is_at_rest(
 ) -> bool:
     """Return True if the energy in ``flight`` is only round-off, or fluctuates by no more than solver noise.
 
-    ``flight`` is (start, end) [time], with end None if it is unknown.  Free flight excites no vibration: whatever
-    vibrates in a part of the flight has vibrated from its start.  So the whole flight is tested if its end is known,
-    not only the time up to td, but for the margin in which the contact may have begun.  Plastic work does not matter:
-    the test is on the fluctuation about the level, however high the level is.  With ``deformed`` (a vibration is known)
-    only the test for round-off is made.
+    ``flight`` is (start, end) [time]; the end is None if it is unknown. Free flight excites no vibration, so a
+    vibration in a part of the flight has existed since its start. Therefore the whole flight is tested if its end is
+    known, not only the time up to td; only the margin is excluded, because the contact may have begun in it. Plastic
+    work does not affect the result, because the test concerns the fluctuation about the level. If ``deformed`` is True
+    (a vibration is known), only the test for round-off is made.
     """
     start, end = flight
     last = td if end is None else max(td, end - LEAST_MARGIN * (end - start))
     _, inside = history.between(start, last)
-    # This number of samples is too small to show a vibration.
+    # Fewer samples than this cannot show a vibration.
     if inside.size < MIN_SAMPLES_PER_PERIOD:
         return False
     # The rounding error is 0 if no energy is written at all.
@@ -85,8 +85,9 @@ def is_at_rest(
 def _find_faint_fluctuation(history: History, start: float) -> float:
     """Return the largest energy fluctuation in a flight that is treated as free of vibration [energy].
 
-    This limit is the largest of the solver error, the printed digits, and a small share of the energy that falls after
-    the ``start`` of the flight [time].  At least the energy that falls was elastic, since plastic work stays.
+    This limit is the largest of the solver error, the error of the printed digits, and a small fraction of the energy
+    decrease after the ``start`` of the flight [time]. This decrease is a lower bound of the elastic energy, because
+    plastic work remains.
     """
     energies = history.between(start, history.end)[1]
     fall = float((np.maximum.accumulate(energies) - energies).max(initial=0.0))
@@ -136,7 +137,7 @@ class AnswerAtTd:
 class Situation:
     """A history at one td [time], with the flight and the vibration around td.
 
-    ``evidence`` describes the vibration that was found.
+    ``evidence`` contains the models of the vibration that were found.
     """
 
     history: History
@@ -270,8 +271,8 @@ def examine_td(
 ) -> Situation:
     """Find the flight around ``td`` and its vibration. Results that many td share are computed once per history.
 
-    Use ``quick`` for a choice among many td: an oscillator that describes most of the record, including td, is not
-    searched for again, and the misfit of a refused oscillator is not computed.
+    ``quick`` should be True for a choice among many td: an oscillator that describes most of the record, including td,
+    is then not searched for again, and the misfit of a refused oscillator is not computed.
 
     Raises
     ------
@@ -321,7 +322,7 @@ def examine_td(
 def _choose_time_of_fit(seen: Seen, td: float) -> float:
     """Return the time around which an oscillator is fitted to the energy [time].
 
-    If nothing flies at td, the oscillator of the nearest flight shows which pairs exist in that flight.
+    If td is not in a flight, the oscillator of the nearest flight shows which pairs exist in that flight.
     """
     if seen.refusal and seen.flight:
         return (seen.flight.start + seen.flight.end) / 2
@@ -377,8 +378,7 @@ def make_look(
 ) -> Look:
     """Return a function that examines a record at a td and caches the situation for each td.
 
-    No flight is assumed to begin before ``since`` [time].  ``quick`` has the same meaning as in the examination of one
-    td.
+    No flight is assumed to begin before ``since`` [time]. ``quick`` has the same meaning as in `examine_td`.
     """
     look = partial(examine_td, history, settings=settings, quick=quick)
     return cache(look if since is None else lambda td: _limit_start(look(td), since))
@@ -419,8 +419,9 @@ def _choose_longer_window(
 ) -> Described | None:
     """Return the window that an oscillator describes, or a longer window that modes describe; None if there is neither.
 
-    Modes follow a mean energy that drifts, so they describe long windows in which an oscillator soon misses it.  Only
-    modes that leave hardly anything go over the end of an oscillator's window, for a contact may have ended it.
+    Modes can follow a drifting mean energy, so they describe longer windows than an oscillator, which cannot. Only
+    modes with a very small misfit may extend beyond the window of an oscillator, because a contact may have ended this
+    window.
     """
     if modes is None:
         return by_oscillator
@@ -436,8 +437,9 @@ def _skip_first_quarter(
 ) -> Described | None:
     """Cut off the first quarter period of an oscillator's window, unless the window begins with the record.
 
-    While the deformation passes through zero, the energy does not show a load below 10 % of the amplitude.  At the
-    largest deformation it shows 1 %.  Each quarter period contains a zero or a largest deformation.
+    While the deformation passes through zero, the energy does not show a load that changes the deformation by less than
+    10 % of the amplitude; at the largest deformation, it shows changes of 1 %. Each quarter period contains a zero or
+    an extremum of the deformation.
     """
     if span is None or fit is None or fit.mode is None:
         return None

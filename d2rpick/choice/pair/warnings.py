@@ -1,6 +1,6 @@
 """Warn about a td, estimate the motion after td from the energy alone, and list the objections to a tr.
 
-Warnings have stable codes for scripts, and sentences for users.
+Each warning has a stable code for scripts and a sentence for users.
 """
 
 from __future__ import annotations
@@ -150,7 +150,8 @@ def _warn_about_flight(situation: Situation) -> Iterator[Caution]:
             and flight.start is not None
             and flight.settled < flight.start
         ):
-            text += f" (the {flight.start - flight.settled:.3g} after {flight.settled:.6g} are not used, for safety)"
+            waited = f"{flight.start - flight.settled:.3g}"
+            text += f" (the energy settles at {flight.settled:.6g}; d2rpick waits for another {waited} to be safe)"
         yield Caution(
             "flight-from-energy", f"{text}; if you know it, give it as `after`"
         )
@@ -328,15 +329,15 @@ def _describe_nearest_flight(situation: Situation) -> str:
 class Expectation(NamedTuple):
     r"""Estimates of the motion after td for a vibration with many modes. The fields are the keys of the JSON output.
 
-    Such a vibration shares its energy equally between internal and kinetic energy.  The locked-in energy above the
-    energy at rest :math:`E_s` comes back as vibration that is shared in the same way:
+    The energy of such a vibration is shared equally between internal and kinetic energy. The frozen energy above the
+    energy at rest :math:`E_s` is released at td as vibration, whose energy is shared in the same way:
 
     .. math:: \frac{E_s + (E(t_r) - E_s)/2}{E_s + (\langle E \rangle - E_s)\,
         e^{-\alpha t_d}/\langle e^{-\alpha t} \rangle}
 
-    The denominator is the energy that the reference run keeps until td: its mean over the flight, less the damping.
-    The energy at rest is assumed to be 0.85 of the lowest energy in the flight.  Only an upper bound of it is certain,
-    so a lower bound of the ratio is given too.
+    The denominator is the mean energy of the reference run at td: its mean over the flight, reduced by damping. The
+    energy at rest is assumed to be 0.85 of the lowest energy in the flight. Since only its upper bound is certain, a
+    lower bound of the ratio is stated, too.
 
     Parameters
     ----------
@@ -411,7 +412,7 @@ def estimate_time_after(
 ) -> Expectation | None:
     """Estimate the motion after td; None if the basis is not "energy" or if the flight or the energy is unknown.
 
-    ``energy_tr`` is the energy that the recommended tr locks in [energy], None if there is no tr.
+    ``energy_tr`` is the energy that the recommended tr freezes [energy]; None if there is no tr.
     """
     means = compute_means(situation)
     if means is None:
@@ -451,7 +452,7 @@ def select_energies_in_flight(situation: Situation) -> tuple[Samples, Samples]:
 def compute_shortfall(energy: Samples, mean: float) -> Samples:
     """Return the relative difference between a locked-in amplitude and the largest one, 1 - sqrt(E/(2 <E>)) [-].
 
-    The shortfall is infinite for larger energies, which must not be locked in.
+    The shortfall is infinite if E exceeds 2 <E>; such energies must not be frozen.
 
     Examples
     --------
@@ -466,9 +467,9 @@ def compute_shortfall(energy: Samples, mean: float) -> Samples:
 class Objection(NamedTuple):
     """An objection to each candidate for which ``holds``, shape (n,), is True.
 
-    ``describe`` returns its text for a candidate by index.  Since answers are pickled with it, it is a function of
-    this module with some of its arguments.  ``is_of_error``: it only says that an error is too large, as the residual
-    does.
+    ``describe`` returns the text of the objection for the candidate with a given index. It is a partial call of a
+    function of this module, because answers are pickled. ``is_of_error`` is True if the objection only states that an
+    error is too large, which the residual shows as well.
     """
 
     holds: NDArray[np.bool_]
@@ -542,8 +543,8 @@ def _object_to_errors(
 ) -> Iterator[Objection]:
     """Yield the objections to candidates whose deformation differs too much from that at td.
 
-    Only ``judged`` candidates have an error.  It is that of the deformation if a model was ``compared``, otherwise that
-    of the level; ``modal`` candidates have a residual.
+    Only ``judged`` candidates have an error. It is the deformation error if a model was ``compared``, otherwise the
+    level error; ``modal`` candidates have a residual.
     """
     error = np.where(compared, columns["lock_in_error"], columns["level_error"])
     nothing = "the energy is not positive at tr, so no deformation can be compared"

@@ -10,7 +10,6 @@ from d2rpick.choice.pair.candidates import Candidate, Candidates, judge_times
 from d2rpick.choice.pair.warnings import find_largest_energy
 from d2rpick.histories.samples import find_crossings, halve_brackets, merge_times
 from d2rpick.vibration.measures import TOLERATED_GROWTH
-from d2rpick.vibration.model import measure_all
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -37,9 +36,9 @@ def find_acceptable_windows(
 ) -> Samples:
     """Find the time windows of acceptable tr.
 
-    The rule of ``verify`` is applied to both ends and the middle of each window; the ends are acceptable too.  Between
-    them the verdict cannot change, because between neighbouring grid points the energy is linear or the deformation
-    monotone.
+    The criteria of ``verify`` are applied to both ends and the middle of each window; the ends are acceptable, too. The
+    verdict cannot change between them, because the energy is linear, or the deformation monotone, between neighbouring
+    grid points.
 
     Parameters
     ----------
@@ -47,8 +46,8 @@ def find_acceptable_windows(
     candidates : Candidates
         All candidates.
     recommended : float or None
-        The recommended tr [time].  From some time on the error stays within the tolerance up to td: on the same swing,
-        where hardly anything is saved.  That window is kept only if the recommended tr lies in it.
+        The recommended tr [time]. Shortly before td, on the same half cycle, the error always stays within the
+        tolerance, but hardly anything is saved. This last window is kept only if the recommended tr lies in it.
 
     Returns
     -------
@@ -87,8 +86,8 @@ def find_alike_windows(
 ) -> Samples:
     """Find the acceptable windows in which the error of a tr exceeds that of the chosen tr by at most 0.05.
 
-    The timing tolerance of a candidate is the time by which it may be off before its frozen-deformation error grows by
-    0.05.  On the energy alone the level error replaces that error.
+    The timing tolerance of a candidate is the time by which it may be wrong before its frozen-deformation error grows
+    by 0.05. If only the energy is known, the level error replaces this error.
 
     Parameters
     ----------
@@ -190,7 +189,7 @@ def make_monotone_grid(situation: Situation, candidates: Candidates) -> Samples:
 
 
 def _make_limit_on_error(situation: Situation, level: float) -> Keeps:
-    """Return a test of times for tr: the error must not exceed ``level``, nor the energy its limit."""
+    """Return a predicate that accepts a tr if its error is at most ``level`` and its energy at most a given limit."""
     highest = find_largest_energy(situation)
 
     def has_small_error(times: Samples) -> NDArray[np.bool_]:
@@ -244,15 +243,15 @@ def make_error_profile(
     ----------
     situation : Situation
     candidates : Candidates
-        All candidates, since the level error has a kink at a crossing.
+        All candidates; they are needed because the level error has a kink at each crossing.
     windows : array of shape (n, 2)
         Windows of acceptable tr, ascending [time].
 
     Returns
     -------
     array of shape (2, m)
-        Times, ascending, and errors: the residual R, or on the energy alone the level error, as `Candidate.error` [-].
-        Between two windows the polyline has no meaning.
+        Ascending times [time], and the errors as in `Candidate.error` [-]: the residual R or, if only the energy is
+        known, the level error. Between two windows the polyline has no meaning.
     """
     if not windows.size:
         return np.zeros((2, 0))
@@ -283,15 +282,18 @@ def interpolate_error(profile: Samples, time: float) -> float:
 def _compute_errors(situation: Situation, times: Samples) -> Samples:
     """Return the stated residuals or, if only the energy is known, the level errors, in the shape of ``times`` [-].
 
-    The stated residual of a pair allows for the error band of the model, so it may exceed the error that is compared
-    with the tolerance.
+    The stated residual of a pair includes the error band of the model, so it may exceed the error that is compared with
+    the tolerance.
     """
     if situation.at_rest or not times.size:
         return np.zeros(times.shape)
-    _, measured = measure_all([situation.vibration], times.ravel(), [0, times.size])
-    compared = np.sqrt(situation.errors(times) ** 2 + (situation.kinetic_share or 0.0))
-    stated = measured["residual"].reshape(times.shape)
-    return np.where(np.isnan(stated), compared, stated)
+    errors = situation.vibration.compute_residuals(times)
+    is_unknown = np.isnan(errors)
+    if is_unknown.any():
+        kinetic_share = situation.kinetic_share or 0.0
+        compared = np.sqrt(situation.errors(times) ** 2 + kinetic_share)
+        errors[is_unknown] = compared[is_unknown]
+    return errors
 
 
 def _is_inside(times: Samples, windows: Samples) -> NDArray[np.bool_]:

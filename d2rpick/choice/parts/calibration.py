@@ -1,13 +1,14 @@
 """Fit the cost weights of a site to the CPU times of its own runs.
 
-A leg of a run is an engine run of Radioss or a restart segment of LS-DYNA.  For each leg, with its computed elements,
-cycles and CPU time,
+A restart segment is an engine run of Radioss, or the part of an LS-DYNA run between two restarts. The CPU time per
+cycle of each restart segment obeys
 
     E = sum of w_k n_k,     T = E + b N + r R
 
-per cycle: E is the time of the elements and T that of all work [us], n_k the number of deformable elements of a
-formulation, N that of nodes, R that of rigid-body nodes.  The w_k, b and r are fitted, each relative to its measured
-value.  Unknowns that the legs do not determine keep their measured ratio to the others.
+where E is the time that the elements need and T the total time [us]. n_k is the number of deformable elements of a
+formulation, N the number of nodes, and R the number of rigid-body nodes. The unknowns w_k, b and r are fitted relative
+to their default values, which were measured with other runs. Unknowns that the restart segments do not determine keep
+their default ratio to the others.
 """
 
 from __future__ import annotations
@@ -64,7 +65,8 @@ _US: Final = 1e6
 class Observation(NamedTuple):
     """The CPU time per cycle of a restart segment [us], and the elements and nodes computed in the segment.
 
-    ``counts`` has the number of deformable elements by class; ``elements`` is None if the solver writes the total only.
+    ``counts`` contains the number of deformable elements by class. ``total`` is the CPU time of all work, and
+    ``elements`` that of the elements; it is None if the solver writes only the total.
     """
 
     name: str
@@ -79,7 +81,7 @@ class Observation(NamedTuple):
 class FittedWeights:
     """The fitted weights, and the number of restart segments that determine each weight.
 
-    ``told`` lists the classes that the legs determine, ``misfit`` is the relative misfit [-].
+    ``told`` lists the unknowns that the restart segments determine, and ``misfit`` is the relative rms misfit [-].
     """
 
     weights: Weights
@@ -95,7 +97,7 @@ def fit_weights(observations: Sequence[Observation]) -> FittedWeights:
     Raises
     ------
     ConfigurationError
-        If there is no leg without rigid parts, or none of its elements has a class with a measured weight.
+        If there is no restart segment without rigid parts, or if no element belongs to a class with a default weight.
     """
     deformable = [
         observation for observation in observations if not observation.rigid_nodes
@@ -175,7 +177,7 @@ def _build_equations(
 def _solve_equations(scaled: Samples) -> tuple[Samples, NDArray[np.bool_]]:
     """Solve the non-negative least-squares problem; return all unknowns, and those that the rows determine.
 
-    Undetermined unknowns stay 1.
+    Unknowns that the rows do not determine are 1.
     """
     from scipy.optimize import lsq_linear
 
@@ -218,7 +220,7 @@ def read_observations_of_runs(
     Raises
     ------
     DeckError, FormatError
-        As ``read_observations``.
+        The errors are those of ``read_observations``.
     """
     legs_by_content: dict[str, tuple[Observation, ...]] = {}
     cautions = []
@@ -250,7 +252,7 @@ def read_observations(folder: str) -> tuple[Observation, ...]:
     Parameters
     ----------
     folder : str
-        Contains the deck of one run, and its Radioss listings, d3hsp or glstat.
+        Folder with the deck of one run and its Radioss listings, d3hsp or glstat.
 
     Raises
     ------
@@ -365,7 +367,7 @@ def _make_observation(
 def _make_zone_observations(
     zones: ZoneTimes, inventory: Inventory, rigid: Sequence[_RigidPart]
 ) -> Iterator[Observation]:
-    """Yield an observation for each set of rigid parts: the median over the states in which these parts are rigid."""
+    """Yield one observation for each set of rigid parts: the median CPU time of a cycle while they are rigid."""
     number = sum(counts.total() for counts in inventory.counts.values())
     states: dict[frozenset[int], list[float]] = {}
     for time, per_zone in zip(

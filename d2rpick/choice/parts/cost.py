@@ -1,14 +1,14 @@
 """Model the cost of a time step, and the fraction of the cost that is saved while selected parts are rigid.
 
-A step costs C = E / s.  E is the sum of weight x number over the computed elements, by formulation, and over their
-integration points through the thickness. s is the fraction of the elements in the cost of a step; assembly, contact and
-output take the rest.  While parts are one rigid body their elements cost nothing, and each of its n nodes costs r, so
-the saved share is
+A time step costs C = E / s. E is the sum of weight x number over the formulations of the computed elements, plus that
+over their integration points through the thickness. s is the fraction of the cost of a time step that is due to
+elements; the rest is due to assembly, contact and output. While parts are one rigid body, their elements cost nothing
+and each of its n nodes costs r, so the saved fraction is
 
     c = (E_rigid - r n) / C.
 
-A run that is rigid for a fraction f of its time takes 1 - f (1 - (1 - c)/m) of the time without switching; m is the
-time step while rigid over that before (`d2rpick.vibration.measures.run_time_share`).
+If the parts are rigid for a fraction f of the run, the run time is 1 - f (1 - (1 - c)/m) times that without switching;
+m is the time step while the parts are rigid divided by that before (`d2rpick.vibration.measures.run_time_share`).
 """
 
 from __future__ import annotations
@@ -51,8 +51,8 @@ _KEYS: Final = (*_NUMBERS, "per_element", "source")
 class Weights:
     """Cost per element and cycle by formulation or class, cost per rigid-body node, and element fraction of a step.
 
-    Only ratios count: all costs have the unit of ``per_element``.  ``file`` is the file that the weights were read
-    from, None if they were not read.
+    Only the ratios of costs matter; all costs have the unit of ``per_element``. ``file`` is the file from which the
+    weights were read; None if there is no such file.
     """
 
     per_element: Mapping[str, float] = field(default_factory=lambda: MEASURED)
@@ -93,7 +93,7 @@ def compute_saved_share(
     ----------
     weights : Weights
     total, rigid : float
-        Costs of all elements, and of the rigid ones, in the unit of the weights.
+        Costs of all elements, and of the rigid elements [unit of the weights].
     nodes : int
         Number of nodes of the rigid bodies.
 

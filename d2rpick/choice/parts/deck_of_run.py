@@ -1,6 +1,6 @@
 """Apply the deck of a run: its rigid bodies, supports, gravity and costs, and warnings about the deck.
 
-If the deck belongs to another model, its part ids do not match the run, so nothing from it is used.
+If the deck belongs to another model, its part ids do not match the run, so the deck is not used.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ def find_rigid_bodies(
 ) -> tuple[RigidBody, ...]:
     """Return the rigid bodies that ``parts`` become; empty if their elements or the ties between them are unknown.
 
-    In LS-DYNA, which switches parts, disconnected pieces of one part become one rigid body.  In Radioss, whose rigid
-    bodies are sets of nodes, each piece may have a body of its own.
+    In LS-DYNA, parts are switched, so disconnected pieces of a part become one rigid body. In Radioss, rigid bodies are
+    sets of nodes, so each piece may be a body of its own.
     """
     if not inventory.complete or not inventory.counts.keys() >= set(parts):
         return ()
@@ -208,7 +208,7 @@ def _get_title_in_deck(part: Part, inventory: Inventory) -> str:
 def _is_different_title(first_title: str, second_title: str) -> bool:
     """Return True if two titles differ apart from spaces and case; one title may be a truncated form of the other.
 
-    Letters beyond ASCII are not compared, since the files of one run encode them in different ways.
+    Non-ASCII letters are not compared, because the files of a run may encode them in different ways.
     """
     plain = (
         "".join(filter(str.isascii, title)) for title in (first_title, second_title)
@@ -223,7 +223,8 @@ def add_deck_to_settings(
 ) -> tuple[Settings, tuple[Caution, ...]]:
     """Return settings with the cost fraction and the rigid bodies that the deck defines for the parts of a history.
 
-    A given cost share is kept.  Warnings list what stays unknown; a deck of another model is not used.
+    A cost share that the user gave is kept. Warnings list the values that remain unknown; a deck of another model is
+    not used.
     """
     inventory = model.inventory
     foreign = check_model_of_deck(reference.run, inventory)

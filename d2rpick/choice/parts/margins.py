@@ -88,8 +88,8 @@ def compute_turning_speed(
 ) -> float | None:
     """Return the speed that the bodies' rotation adds at the points of contact [length/time]; None if it is unknown.
 
-    If the deck gives the places of the parts but nothing shows how the bodies turn, it is the least speed that the
-    kinetic energy allows.  None if there is no deck, or if the momenta do not show a direction.
+    If the deck contains the positions of the parts but the rotation of the bodies is unknown, the result is the lowest
+    speed that the kinetic energy allows. It is None if there is no deck, or if the momenta do not show a direction.
     """
     from d2rpick.flight.turning_bound import bound_turning_speed
 

@@ -46,11 +46,11 @@ from d2rpick.vibration.measures import run_time_share
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
+    from d2rpick.base.spans import Times
     from d2rpick.choice.pair.decision import Decision
     from d2rpick.choice.pair.situation import Situation
     from d2rpick.choice.parts.cost import CostModel, Share, Weights
     from d2rpick.choice.question import Settings
-    from d2rpick.choice.switched.switched_run import Times
     from d2rpick.deck.model import Inventory
     from d2rpick.histories.run import OpenedRun
 
@@ -65,13 +65,14 @@ _NO_ANGLE: Final = "the part momenta do not show how a body of these parts rotat
 class PartSet(NamedTuple):
     """A set of parts with its saving and errors. Unknown values are None, with the cause in ``reasons``.
 
-    ``bodies`` are the rigid bodies that the parts become, ``cost_share`` is the fraction of a step that they save [-].
-    `step_growth` is the factor by which the time step may grow meanwhile [-], infinite if no deformable part limits
-    it; predictions use the factor of the settings.  ``window`` is (tr, td) in the longest flight [time],
-    ``rigid_fraction`` its share of the record [-].  ``angle_error`` is the rotation error of a body at td [degrees]; it
-    and the position error may be larger if ``position_is_lower_bound``.  ``moving`` are the parts that move relative to
-    the rest; ``apart``: some of them fly away from the body that they are to become part of.  ``decision`` is the
-    verdict on the window, ``cost_reason`` says why the saving is unknown.
+    ``bodies`` are the rigid bodies that the parts become, and ``cost_share`` is the fraction of the cost of a time step
+    that they save [-]. ``step_growth`` is the factor by which the time step may grow while they are rigid [-], infinite
+    if no deformable part limits it; predictions use the factor of the settings instead. ``window`` is (tr, td) in the
+    longest flight [time], and ``rigid_fraction`` its fraction of the record [-]. ``angle_error`` is the rotation error
+    of a body at td [degrees]; if ``position_is_lower_bound`` is True, this error and the position error may be larger.
+    ``moving`` contains the parts that move relative to the others; ``apart`` is True if some of them separate from the
+    body to which they are to belong. ``decision`` is the verdict on the window, and ``cost_reason`` the reason why the
+    saving is unknown.
     """
 
     name: str
@@ -160,16 +161,16 @@ def compare_sets_of_parts(
     run : Run
         The reference run.
     settings : Settings
-        As for ``suggest``; its cost share is not used.
+        Settings as for ``suggest``; their cost share is not used.
     model : CostModel or None
         The deck with its costs; if it is missing, the costs and most verdicts stay unknown.
     given_ids : sequence of int
         Part ids of a further set to compare.
     times : (float, float) or float, optional
-        tr and td of the comparison, or td alone [time].  Default: td at the end of the longest flight, and for each set
-        the tr of ``suggest``.
+        tr and td of the comparison, or only td [time]. By default, td is at the end of the longest flight, and each set
+        has the tr that ``suggest`` recommends.
     deck_files : sequence of str
-        Files of the deck; a d3hsp in the same folder gives the smallest time steps of the parts.
+        Files of the deck; a d3hsp file in the same folder contains the smallest time steps of the parts.
 
     Returns
     -------
@@ -457,9 +458,9 @@ def _mark_recommended(
 ) -> Iterator[PartSet]:
     """Mark the recommended set: the one with the largest saving or, if savings are equal, with the fewest parts.
 
-    A set with a poor pair, or with too large a position error, is considered only if all sets have one.  If no saving
-    is known for want of weights, the rigid share of the elements replaces it, because the verdict on the times does not
-    depend on the weights; ``has_all_elements``: the elements of all parts are known.
+    A set with a poor pair or too large a position error is considered only if all sets are like this. If the saving is
+    unknown because weights are missing, the fraction of rigid elements replaces it, because the verdict on the times
+    does not depend on the weights. ``has_all_elements`` is True if the elements of all parts are known.
     """
     gains = {part_set.parts: part_set.saving for part_set in sets}
     if has_all_elements and all(gain is None for gain in gains.values()):

@@ -13,7 +13,9 @@ from d2rpick.choice.td.flights import find_flights
 from d2rpick.deck.geometry import compute_masses_and_steps
 from d2rpick.deck.model import DISCRETE, Inventory, PartData
 from d2rpick.deck.pieces import count_pieces
+from d2rpick.flight.internal_energy import find_largest
 from d2rpick.flight.momentum import find_parts_flying_together, list_deformable_parts
+from d2rpick.flight.window import LAST_DIGIT
 from d2rpick.histories.opening import Selection
 from d2rpick.histories.run import NO_STATES
 from d2rpick.histories.samples import find_window
@@ -44,8 +46,9 @@ _CHEAP: Final = 0.1
 class InFlight(NamedTuple):
     """Data of one part in one flight; energies are None if they are not written or the part has none.
 
-    ``scatter`` is the standard deviation of the internal energy over its mean [-]; ``change`` is its value at the end
-    minus that at the start [energy].  ``landing`` is the energy that the part takes up at the start of the landing.
+    ``scatter`` is the standard deviation of the internal energy divided by its mean [-]; ``change`` is the energy at
+    the end minus that at the start [energy]. ``landing`` is the energy that the part absorbs at the start of the
+    landing [energy].
     """
 
     flies: bool | None = None
@@ -63,7 +66,8 @@ class InFlight(NamedTuple):
 class PartFacts(NamedTuple):
     """Data of one part from the history; ``has_energy`` is None if its energy is not written.
 
-    ``held`` names the support that acts on it in the longest flight, or at the end of a record without flights.
+    ``held`` names the support that acts on the part in the longest flight or, without flights, at the end of the
+    record.
     """
 
     part: Part
@@ -76,8 +80,8 @@ class PartFacts(NamedTuple):
 class RunFacts(NamedTuple):
     """Data of all parts from the history.
 
-    ``flights`` are (start, end) [time], ``longest`` is the index of the longest one, None if there are no flights.
-    ``reason`` states why there are no parts or no flights.
+    ``flights`` contains (start, end) of each flight [time], and ``longest`` the index of the longest flight; None if
+    there are no flights. ``reason`` states why there are no parts or no flights.
     """
 
     parts: Mapping[int, PartFacts]
@@ -94,7 +98,7 @@ def collect_facts(run: OpenedRun, settings: Settings) -> RunFacts:
     run : Run
         The reference run.
     settings : Settings
-        Options for the search for flights if momenta do not show them.
+        Options for the search for flights, which are needed if momenta do not show them.
 
     Returns
     -------
@@ -168,6 +172,9 @@ def _measure_in_flight(
         return InFlight(flies)
     mean = float(inside.mean())
     scatter = float(inside.std()) / mean if mean > 0 else None
+    if find_largest(inside) <= LAST_DIGIT * find_largest(energy):
+        # The part does not vibrate: its energy in flight is only round-off of its energy in later contacts.
+        scatter = 0.0
     return InFlight(
         flies,
         mean,
@@ -203,9 +210,10 @@ def _read_masses(run: OpenedRun) -> dict[int, float]:
 class PartRow(NamedTuple):
     """All data of one part; unknown values are None.
 
-    ``cost_share`` is the share of its elements in the cost of all elements [-], ``smallest_step`` its smallest stable
-    time step [time]; ``mass_source`` and ``step_source`` name their sources.  ``flights`` has the data of the part in
-    each flight, ``flight`` those in the longest.  ``merge_with`` is the part whose rigid body it joins.
+    ``cost_share`` is the fraction of the cost of all elements that is due to those of the part [-]. ``smallest_step``
+    is the smallest stable time step of the part [time]; ``mass_source`` and ``step_source`` name the sources of the
+    mass and of this time step. ``flights`` contains the data of the part in each flight, and ``flight`` those in the
+    longest flight. ``merge_with`` is the part whose rigid body this part joins.
     """
 
     id: int
@@ -435,7 +443,7 @@ def _list_remarks_on_switch(
         yield (
             "flies, so it can be rigid; vibrates, so its energy at tr must match td"
             if row.flight.deforms
-            else "flies, so it can be rigid; no longer vibrates, so any tr fits"
+            else "flies, so it can be rigid; does not vibrate, so any tr fits"
         )
     if data and data.section.formulations.keys() & {
         "solid",
@@ -453,7 +461,7 @@ def compute_step_growth(
 ) -> float | None:
     """Return the smallest growth factor of the time step while the ``switched`` parts are rigid, at least 1 [-].
 
-    The result is None if the time step of a part that stays deformable is unknown, infinite if no part stays
+    The result is None if the time step of a part that remains deformable is unknown. It is infinite if no part remains
     deformable.
     """
     computed = [

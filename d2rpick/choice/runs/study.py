@@ -76,7 +76,7 @@ _DEFAULT = Selection()
 class Question:
     """The question that is asked of every run; ``td`` is a time, a time range, or None for the longest flight.
 
-    With ``curve`` an outline of the energy is kept for drawing.
+    If ``curve`` is True, an outline of the energy is kept for drawing.
     """
 
     td: float | tuple[float, float] | None
@@ -99,12 +99,13 @@ class Stamp(NamedTuple):
 class StudyRow:
     """The answer for one run, with times in the unit of its history; None if a value is unknown.
 
-    ``status`` is "ok"; "none": nothing can be recommended; "unreadable"; "out-of-range": the record does not reach td
-    or is too short; "failed": its process died; "internal-error": the program failed.  ``message`` gives the reason for
-    a status other than "ok"; ``warnings`` are codes.  ``quality`` to ``cure`` are those of the suggestion for its pair.
-    ``td`` is that of the run.  ``acceptable`` are the windows of acceptable tr, shape (n, 2), ``alike`` those in which
-    the error is at most 0.05 above that of its tr, ``profile`` the errors, shape (2, m).  ``files`` were read, up to
-    ``record_end``; ``curve`` is an outline of the energy, shape (2, k), if it was requested.
+    ``status`` is "ok", "none" (no pair can be recommended), "unreadable", "out-of-range" (the record does not reach td
+    or is too short), "failed" (its process died), or "internal-error" (the program failed). ``message`` gives the
+    reason for a status other than "ok"; ``warnings`` contains codes. The fields from ``quality`` to ``cure`` are those
+    of the suggestion for this run. ``td`` is that of this run, and ``better_td`` that of a better pair. ``acceptable``
+    contains the windows of acceptable tr, shape (n, 2), and ``alike`` the windows in which the error exceeds that of
+    the run's own tr by at most 0.05. ``profile`` contains the errors, shape (2, m). ``files`` were read up to
+    ``record_end`` [time]. ``curve`` is an outline of the energy, shape (2, k), if it was requested.
     """
 
     source: str
@@ -125,6 +126,7 @@ class StudyRow:
     verdict: str | None = None
     verdict_reason: str | None = None
     cure: str | None = None
+    better_td: float | None = None
     acceptable: Samples = field(default_factory=lambda: np.zeros((0, 2)))
     alike: Samples = field(default_factory=lambda: np.zeros((0, 2)))
     profile: Samples | None = None
@@ -140,9 +142,9 @@ class StudyRow:
 class Common(NamedTuple):
     """The tr for all judged runs, with the window that all runs share [time]; None, with a reason, if no tr suits all.
 
-    ``keeps_tolerance``: tr lies within the timing tolerance of every run, so that no error exceeds the error at the
-    run's own tr by more than 0.05.  ``errors`` are the errors at this tr, one for each run: residuals, or
-    level errors on the energy alone [-]; None if the run was not judged.
+    ``keeps_tolerance`` is True if tr lies within the timing tolerance of every run, so that no error exceeds the error
+    at the run's own tr by more than 0.05. ``errors`` contains the error of each run at this tr [-]; None if the run was
+    not judged. It is a residual or, if only the energy is known, a level error.
     """
 
     tr: float | None
@@ -164,7 +166,8 @@ class Spread(NamedTuple):
 class StudyOfRuns:
     """The answer of ``study``; ``agree`` is True if the tr intervals of all runs overlap, None if there is no tr.
 
-    ``td`` is None if each run has its own, chosen in ``td_window``, or in its longest flight if that is None too.
+    ``td`` is None if each run has a td of its own, which is chosen in ``td_window`` or, if this is None, in the longest
+    flight of the run.
     """
 
     td: float | None
@@ -298,6 +301,7 @@ def _list_decision_fields(decision: Decision | None) -> dict[str, Any]:
         return {}
     return {
         "quality": decision.grade,
+        "better_td": decision.better.td if decision.better else None,
         "verdict": decision.verdict,
         "verdict_reason": decision.reason,
         "cure": decision.cure,
@@ -400,6 +404,34 @@ def _digest_files(row: StudyRow) -> tuple[bytes, ...]:
 
 def _warn_about_runs(rows: Sequence[StudyRow], common: Common) -> Iterator[Caution]:
     """Yield the warnings about single runs, and warnings about repeated, omitted and dissimilar runs."""
+    judged = [row for row in rows if row.judged]
+    yield from _warn_about_unusual_files(rows)
+    if common.keeps_tolerance is False:
+        text = f"tr = {common.tr:g} is admissible in all runs, but no tr is within the timing tolerance of every run"
+        yield Caution(
+            "timing-tolerance",
+            f"{text}: in at least one run the error grows by more than 0.05",
+        )
+    yield from _warn_about_difference(
+        "mixed-units",
+        "the runs have different units of time, but td has only one",
+        [row.time_unit for row in judged],
+    )
+    yield from _warn_about_difference(
+        "mixed-bases",
+        "the basis of the choice differs between the runs",
+        [row.basis for row in judged],
+    )
+    for code in dict.fromkeys(code for row in judged for code in row.warnings):
+        sources = [row.source for row in judged if code in row.warnings]
+        yield Caution(
+            code,
+            f"in {len(sources)} of {format_number_of_runs(len(judged))}: {list_names(sources, most=NAMED)}",
+        )
+
+
+def _warn_about_unusual_files(rows: Sequence[StudyRow]) -> Iterator[Caution]:
+    """Yield warnings about runs that were given twice, could not be judged, or end early."""
     repeated = find_repeated_runs(rows)
     if repeated:
         names = list_names([row.source for group in repeated for row in group], NAMED)
@@ -410,9 +442,8 @@ def _warn_about_runs(rows: Sequence[StudyRow], common: Common) -> Iterator[Cauti
             f"the same content was given more than once ({names}), so the study rests on {different_count} of "
             f"{format_number_of_runs(judged_count)}; give each run once",
         )
-    judged = [row for row in rows if row.judged]
     left_out = [row.source for row in rows if not row.judged]
-    if left_out and judged:
+    if left_out and len(left_out) < len(rows):
         text = (
             f"{len(left_out)} of {format_number_of_runs(len(rows))} could not be judged"
         )
@@ -429,45 +460,27 @@ def _warn_about_runs(rows: Sequence[StudyRow], common: Common) -> Iterator[Cauti
             "cut-runs",
             f"{count} were cut, or end earlier than most: {list_names(cut, most=NAMED)}",
         )
-    if common.keeps_tolerance is False:
-        text = f"tr = {common.tr:g} is admissible in all runs, but no tr is within the timing tolerance of every run"
-        yield Caution(
-            "timing-tolerance",
-            f"{text}: in at least one run the error grows by more than 0.05",
-        )
-    for code, sentence, kinds in (
-        (
-            "mixed-units",
-            "the runs have different units of time, but td has only one",
-            [row.time_unit for row in judged],
-        ),
-        (
-            "mixed-bases",
-            "the basis of the choice differs between the runs",
-            [row.basis for row in judged],
-        ),
-    ):
-        counted = Counter(kind or "not named" for kind in kinds)
-        if len(counted) > 1:
-            counts = [
-                f"{kind} in {format_number_of_runs(n)}"
-                for kind, n in counted.most_common()
-            ]
-            yield Caution(code, f"{sentence}: {', '.join(counts)}")
-    for code in dict.fromkeys(code for row in judged for code in row.warnings):
-        sources = [row.source for row in judged if code in row.warnings]
-        yield Caution(
-            code,
-            f"in {len(sources)} of {format_number_of_runs(len(judged))}: {list_names(sources, most=NAMED)}",
-        )
+
+
+def _warn_about_difference(
+    code: str, sentence: str, kinds: Sequence[str | None]
+) -> Iterator[Caution]:
+    """Yield a warning if the runs have different ``kinds``, e.g. of units, with the number of runs of each kind."""
+    counted = Counter(kind or "not named" for kind in kinds)
+    if len(counted) > 1:
+        counts = [
+            f"{kind} in {format_number_of_runs(n)}" for kind, n in counted.most_common()
+        ]
+        yield Caution(code, f"{sentence}: {', '.join(counts)}")
 
 
 def choose_common_tr(rows: Sequence[StudyRow]) -> Common:
     """Choose one tr for all judged runs: the median if the tr agree, otherwise the earliest tr that suits all runs.
 
-    A tr suits all runs if it keeps the timing tolerance of every run.  If no tr does, choose the earliest tr that is
-    acceptable in all runs and at which the largest loss of a run is hardly larger than necessary.  Unless the runs
-    agree, the tr has few digits, which costs at most 1/1000 of the rigid time.
+    A tr suits all runs if it lies within the timing tolerance of every run. If no tr does, the result is the earliest
+    tr that is acceptable in all runs and for which the largest error increase of any run is hardly larger than
+    necessary. Unless the tr of the runs agree, the result is rounded to few digits, which costs at most 1/1000 of the
+    rigid time.
     """
     judged = [row for row in rows if row.judged]
     if not judged:
@@ -565,7 +578,7 @@ def _is_in_windows(windows: Samples, time: float) -> bool:
 def find_outliers(rows: Sequence[StudyRow]) -> tuple[StudyRow, ...]:
     """Return the outliers: first the judged runs without any tr, then the runs whose tr lies beyond Tukey's fences.
 
-    The farthest from the median come first.
+    The runs whose tr is farthest from the median come first.
     """
     without = [row for row in rows if row.judged and row.tr is None]
     chosen = [(row, row.tr) for row in rows if row.tr is not None]

@@ -21,8 +21,8 @@ def add_comparison(
 ) -> PairVerdict:
     """Add the comparison of a finished switched run with the reference run to a verdict.
 
-    Both runs are read in the same way.  ``min_mean`` is the smallest expected mean energy after td, as a share of that
-    of the reference run [-].
+    Both runs are read in the same way. ``min_mean`` is the smallest expected mean energy after td, relative to that of
+    the reference run [-].
 
     Raises
     ------

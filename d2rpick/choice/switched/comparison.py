@@ -1,6 +1,6 @@
 """Compare a finished switched run with its reference run: locked-in energy, energy at td, and motion.
 
-Between tr and td only the energy is compared: a rigid part reports neither kinetic energy nor momentum.
+Between tr and td, only the energy is compared, because no kinetic energy or momentum is written for a rigid part.
 """
 
 from __future__ import annotations
@@ -50,15 +50,16 @@ _BETWEEN: Final = 101
 class Comparison(NamedTuple):
     """Differences between a switched run and its reference run; unknown quantities are None.
 
-    The fields except ``min_mean``, the smallest expected ratio of the means [-], are the keys of the JSON output.
+    The fields are the keys of the JSON output, except ``min_mean``, which is the smallest expected ratio of the means
+    [-].
 
-    ``energy_frozen`` is the energy of the switched run at td, ``energy_td`` that of the reference run.  ``rigid_from``
-    and ``rigid_to`` are the first and last state of the window around the middle of (tr, td) in which the energy of the
-    switched run is constant [time], None if it is not.  Means and spreads (standard deviations) are taken from td to
-    ``end``.  ``momentum_error`` is the largest deviation of the momentum after the first state from td on, relative to
-    the largest momentum of the reference run there; ``displacement`` is the largest distance there between the centres
-    of the parts in both runs [length].  ``notes`` list what was left out or assumed when reading the switched run but
-    not the reference run, and anomalies of the switched run.
+    ``energy_frozen`` is the energy of the switched run at td, ``energy_td`` that of the reference run. ``rigid_from``
+    and ``rigid_to`` are the first and last states of the window around the middle of (tr, td) in which the energy of
+    the switched run is constant [time]; None if there is no such window. Means and spreads (standard deviations) refer
+    to the time from td to ``end``, as do the next two fields, which ignore the first state. ``momentum_error`` is the
+    largest deviation of the momentum, relative to the largest momentum of the reference run, and ``displacement`` the
+    largest distance between the centres of the parts in both runs [length]. ``notes`` lists anomalies of the switched
+    run, and what was omitted or assumed when reading the switched run but not the reference run.
     """
 
     source: tuple[str, ...]
@@ -88,8 +89,8 @@ def compare_with_reference(
 ) -> Comparison:
     """Compare a finished switched run with its reference run by the parts that both runs contain.
 
-    Both are read in the same way.  ``situation`` is that of td in the reference run; ``min_mean`` is described at
-    ``compare_runs``.
+    Both runs are read in the same way. ``situation`` is that at td in the reference run; see ``compare_runs`` for
+    ``min_mean``.
 
     Raises
     ------
@@ -152,15 +153,16 @@ def compare_runs(
     pair : (float, float)
         tr and td [time].
     end : float
-        The next contact, or the end of the records [time].
+        Time of the next contact, or the end of the records [time].
     tolerance : float
         Largest error of the locked-in amplitude [-].
     momenta, centres : pair of Track or None
-        Of the reference run and of the switched run; None if a run has no such data.
+        Momenta and centres of the reference run and of the switched run; None if a run has no such data.
     is_reported : bool
         True if the switched run reports its energies correctly after td; if not, they are not compared.
     min_mean : float
-        Smallest mean energy after td as a fraction of that of the reference run [-]; 2 - ``min_mean`` is the largest.
+        Smallest expected mean energy after td, relative to that of the reference run [-]; the largest one is 2 -
+        ``min_mean``.
 
     Raises
     ------
@@ -213,7 +215,7 @@ def compare_runs(
 class _EnergiesAfter(NamedTuple):
     """Energies of both runs at their states from td to ``end`` [time], each of shape (n,) [energy].
 
-    ``reported_while_rigid`` is the energy that the solver reports while the parts are rigid, None if it is right.
+    ``reported_while_rigid`` is the energy that the solver reports while the parts are rigid; None if it is correct.
     """
 
     end: float
@@ -239,7 +241,7 @@ def _select_energies_after(
 ) -> tuple[Samples, float | None]:
     """Return the energies of the switched run from td to ``end``, and the energy while rigid if it is wrong.
 
-    The second value is the energy that the solver reports while the parts are rigid, None if it is right.
+    The second value is the energy that the solver reports while the parts are rigid; None if it is correct.
     """
     energies_after = switched.between(td, end)[1]
     energies_before = switched.energy[switched.time < td]
@@ -320,7 +322,8 @@ def _check_rigid_window(
 ) -> Iterator[str]:
     """Yield an objection if the states show that the energy is not constant from tr to td.
 
-    A constant energy before tr or after td matters only if that of the reference run is not constant there.
+    A constant energy before tr or after td is an objection only if the energy of the reference run is not constant
+    there.
     """
     if rigid is None:
         yield f"the switched run has no state between tr {tr:g} and td {td:g}: it may not have been rigid"
@@ -420,13 +423,13 @@ def find_switch_times(switched: History, reference: History) -> tuple[float, flo
     Returns
     -------
     tr, td : float
-        tr lies between the last changing state and the first constant one, at the time at which the reference run has
-        that energy; td is the last constant state [time].
+        tr lies between the last state before the energy is constant and the first state of constant energy, at the time
+        at which the reference run has this energy; td is the last state of constant energy [time].
 
     Raises
     ------
     RangeError
-        If there is no such time, as in a flight in which nothing vibrates.
+        If there are no such times, for example because nothing vibrates in the flight.
     """
     time = switched.time
     energy = switched.energy
@@ -505,7 +508,7 @@ def _compute_distance(
 ) -> float | None:
     """Return the largest distance between two tracks in a time range; None if either track is missing.
 
-    The first state at or after td is left out, since the parts may still be rigid in that state.
+    The first state at or after td is omitted, because the parts may still be rigid in this state.
     """
     if reference is None or switched is None:
         return None

@@ -1,7 +1,8 @@
 """Recognise a switched run by its energy alone, which is constant while the parts are rigid.
 
-At the release nothing vibrates, so all vibration energy is strain energy, and the internal energy can only fall.  This
-distinguishes a rigid window from a flight in which nothing vibrates: the contact that ends such a flight adds energy.
+At td, the parts have no vibration velocity, so all vibration energy is strain energy, and the internal energy can only
+fall. This distinguishes a rigid window from a flight in which nothing vibrates, because the contact that ends such a
+flight adds energy.
 """
 
 from __future__ import annotations
@@ -17,9 +18,9 @@ from d2rpick.flight.window import LAST_DIGIT
 from d2rpick.histories.samples import find_stretches
 
 if TYPE_CHECKING:
+    from d2rpick.base.spans import Times
     from d2rpick.histories.history import History, Samples
 
-Times = tuple[float, float]
 # A part is recognised as rigid after at least this number of states without kinetic energy or of constant energy.
 FEWEST: Final = 12
 # An energy vibrates if it changes by at least this multiple of the limit for a constant energy [-].
@@ -59,7 +60,7 @@ def _is_frozen(energy: Samples, stretch: slice, limit: float, rounding: float) -
 def refuse_switched(history: History, start: float | None, td: float) -> None:
     """Raise RangeError if the parts were rigid at some time from the start of the flight to td [time].
 
-    An unknown ``start`` is that of the record.
+    If ``start`` is unknown, the test begins at the start of the record.
     """
     earliest = history.start if start is None else start
     rigid = [

@@ -1,8 +1,9 @@
 """Analyse a switched run: when its parts were rigid, which parts can be compared, and when it landed.
 
-While solids are rigid, some solvers report a sum of energy densities for them, and some do so even afterwards.  A
-frozen deformation does not change, so a part that is deformable again should have its energy of tr.  If the energy
-differs by more than the part's largest energy in the reference run, it is reported wrongly, and the part is ignored.
+While solids are rigid, some solvers report a sum of energy densities instead of the energy, and some do so even after
+td. A frozen deformation does not change, so a part that becomes deformable again should have the same energy as at tr.
+If the energy differs by more than the part's largest energy in the reference run, the solver reports a wrong energy,
+and the part is ignored.
 """
 
 from __future__ import annotations
@@ -33,12 +34,12 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from d2rpick.base.spans import Times
     from d2rpick.choice.question import Reference
     from d2rpick.flight.flight import Flight
     from d2rpick.histories.history import Samples
     from d2rpick.histories.run import OpenedRun
 
-Times = tuple[float, float]
 # Sources that, unlike the energy alone, determine the start of a flight to within a few states.
 _SHARP: Final = ("momentum", "contact-force", "contact-energy", "energy-balance")
 # Parts are treated as not moving if their momentum is at most this fraction of the model's momentum [-].
@@ -50,8 +51,8 @@ _SAME_STATES: Final = 3
 class DoneWindow(NamedTuple):
     """A window in which a run was switched, the flight around it, and the actual and planned landing times.
 
-    ``landing`` and ``planned`` are None if no contact is seen, or no earlier run is given; ``step`` is the output
-    interval, below which both are equal [time].
+    ``landing`` and ``planned`` are None if the respective run shows no contact; ``planned`` is also None if no earlier
+    run is given. ``step`` is the output interval [time]; smaller differences of both times are ignored.
     """
 
     tr: float
@@ -130,9 +131,9 @@ def prepare_switched_history(
     Returns
     -------
     history : History
-        The part momenta are left out if rigid bodies had replaced the parts.
+        History without part momenta if rigid bodies had replaced the parts.
     windows : tuple of (float, float)
-        Windows that are done: ``done``, and others in which all requested parts were rigid [time].
+        The windows ``done``, and others in which all requested parts were rigid [time].
     cautions : tuple of Caution
         Warnings about further rigid windows, and about parts that were not rigid in ``done``.
 
@@ -169,8 +170,8 @@ def prepare_switched_history(
 def select_model_momenta(history: History) -> History:
     """Remove the part momenta from a history, because rigid bodies have replaced parts.
 
-    Energies of rigid solids are meaningless, so only the momentum of the model shows whether the model flies.  What is
-    written of the parts is kept for flights in which they are deformable.
+    Energies of rigid solids are meaningless, so only the momentum of the model shows whether the model flies. The part
+    momenta remain in the written evidence, for flights in which the parts are deformable.
     """
     whole = tuple(
         replace(momenta, flying=momenta.chosen)
@@ -184,7 +185,8 @@ def select_model_momenta(history: History) -> History:
 def find_rigid_times(reference: Reference) -> tuple[Times, ...]:
     """Return the windows in which the output of the parts shows them to be rigid [time].
 
-    If the whole record is rigid, parts with energy have no mass, or no part moves although the model does.
+    If the parts are rigid throughout the record, parts with energy have no mass, or no part moves although the model
+    moves.
     """
     windows = tuple(
         (momenta.start, momenta.end) for momenta in _find_absent_windows(reference)
@@ -225,7 +227,7 @@ def find_done_windows(
     windows: Sequence[Times],
     planned: Sequence[Flight] | None,
 ) -> tuple[DoneWindow, ...]:
-    """Find when the flights with completed windows landed, and when these landings were planned."""
+    """Find the actual and the planned landing times of the flights whose windows are complete."""
     done = []
     for tr, td in windows:
         flight = _find_flight_around(history, flights, tr, td)
@@ -264,7 +266,7 @@ def _warn_about_deforming(
     Raises
     ------
     RangeError
-        If no part was rigid, as far as the files show.
+        If no part was rigid according to the files.
     """
     run, history, parts = *reference, _select_deformable(reference)
     rigid = detect_rigid_parts(run, parts, history.time, tr, td)
@@ -371,7 +373,7 @@ def detect_rigid_parts(
 ) -> NDArray[np.bool_] | None:
     """Return True for each part that was rigid from tr to td, shape (parts,); None if there are too few states.
 
-    ``time`` has the times of the parts' states, shape (n,).
+    ``time`` (n,) contains the times at which the states of the parts are written [time].
     """
     inside = find_window(time, np.nextafter(tr, td), np.nextafter(td, tr))
     # The solver switches at the first step after tr, so the first state is skipped.
@@ -391,7 +393,7 @@ def detect_rigid_parts(
 class SameParts(NamedTuple):
     """Energies of the same parts in both runs, with objections and notes about the other parts.
 
-    ``is_reported`` is False if the energies of all parts are reported wrongly.
+    ``is_reported`` is False if the solver reports wrong energies of all parts.
     """
 
     reference: History
@@ -416,7 +418,8 @@ def choose_same_parts(
     Returns
     -------
     SameParts
-        The rigid parts if only some parts of the model were rigid; never parts whose energies are reported wrongly.
+        The rigid parts if only some parts of the model were rigid, otherwise all parts; parts with wrong energies are
+        excluded.
     """
     as_read = SameParts(without.history, switched.history)
     try:

@@ -33,13 +33,13 @@ def find_longest_flight(
 ) -> tuple[float, float]:
     """Return the longest flight of the record as a range for td [time].
 
-    If only the energy shows the flight, its end may differ from td to td; then the window keeps the margin.  If there
-    is no flight, ``otherwise`` is returned.
+    If only the energy shows the flight, its end may depend on td; the range then excludes the margin. If there is no
+    flight, ``otherwise`` is returned.
 
     Raises
     ------
     RangeError
-        If there is no flight and no ``otherwise``.
+        If there is no flight and ``otherwise`` is not given.
     """
     flights = find_flights(history, settings)
     if settings.landing is not None:
@@ -80,7 +80,7 @@ def find_flights(history: History, settings: Settings) -> tuple[Flight, ...]:
     Parameters
     ----------
     history : History
-        With the evidence of its run.
+        History with the evidence of its run.
     settings : Settings
         Options for the search for an oscillator if no better evidence shows a flight.
 
@@ -221,8 +221,8 @@ def _find_flights_without_landing(
 def list_momentum_columns(history: History) -> dict[str, Samples]:
     """Return the momentum columns that show the flight and the mass column, keyed by name.
 
-    They belong to the parts that fly longest, or to the chosen parts.  If only the velocity of the model is known, they
-    are columns of the velocity.  The result is empty if neither is written at the times of the energy.
+    The columns belong to the parts that fly longest, or to the chosen parts. If only the velocity of the model is
+    known, they are columns of the velocity. The result is empty if neither is written at the times of the energy.
     """
     import numpy as np
 

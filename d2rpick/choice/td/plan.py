@@ -1,11 +1,11 @@
 """Plan the rigid windows of a run: find times for each flight, and the windows that need no further reference run.
 
-A window in which nothing vibrates locks in no energy and does not move any landing.  A window that locks in energy
-moves the next landing by less than the margin, and later landings by more than any margin.  Therefore one reference
-run supports all windows up to and including the first that locks in energy.  Later windows are planned from the
-run that is switched in these windows (docs/explanation/planning.md, "Why you cannot use all windows of one run").
+A window in which nothing vibrates freezes no vibration energy and does not shift any landing. A window that freezes
+energy shifts the next landing by less than the margin, and later landings by more than any margin. Therefore one
+reference run supports all windows up to and including the first one that freezes energy. Later windows are planned from
+the run that is switched in these windows (docs/explanation/planning.md, "Why you cannot use all windows of one run").
 
-Each window that locks in energy requires another run, so a short window is left out in favour of a longer later one.
+Each window that freezes energy requires a further run, so a short window is left out in favour of a longer later one.
 """
 
 from __future__ import annotations
@@ -22,7 +22,6 @@ from d2rpick.choice.health import WRONG_ENERGY, refuse_unsound, warn_about_engin
 from d2rpick.choice.parts.margins import find_margin
 from d2rpick.choice.switched.switched_run import (
     DoneWindow,
-    Times,
     find_done_windows,
     prepare_switched_history,
 )
@@ -32,6 +31,7 @@ from d2rpick.flight.internal_energy import round_off
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
+    from d2rpick.base.spans import Times
     from d2rpick.choice.answers import PairSuggestion
     from d2rpick.choice.pair.candidates import Candidate, Pair
     from d2rpick.choice.pair.decision import Decision
@@ -45,14 +45,17 @@ if TYPE_CHECKING:
 # If windows of lengths w and W (the later one) are both used, two successive runs are rigid for w and w + W.
 # If only the later window is used, both runs are rigid for W, which is more in total if W > 2 w.
 _LONGER: Final = 2.0
+# The reason for leaving out a flight that is too short for a window begins with these words.
+TOO_SHORT: Final = "too short"
 
 
 class PlannedFlight(NamedTuple):
     """One flight of a run and its rigid window, with times in the unit of the history.
 
-    ``status`` is "supported" by this reference run, "re-plan" from a switched run, "done", or "left-out"; ``reason``
-    explains all but the first.  ``answer`` is the suggestion for this flight, None if there is none.  ``done``
-    describes the result of a done window; ``record`` is the length of the record.
+    ``status`` is "supported" (by this reference run), "re-plan" (to be planned from a switched run), "done", or
+    "left-out"; ``reason`` explains every status except "supported". ``answer`` is the suggestion for this flight; None
+    if there is none. ``done`` describes the result of a window that is done; ``record`` is the length of the record
+    [time].
     """
 
     number: int
@@ -106,7 +109,7 @@ class PlannedFlight(NamedTuple):
     def locks_in(self) -> bool | None:
         """True if the window locks in energy, which shifts later landings; None if there is no window.
 
-        The window locks in no energy if the energy is constant except for round-off, as in a free fall from rest.
+        The window freezes no vibration energy if the energy is constant within round-off, as in a free fall from rest.
         """
         if self.answer is None or self.window is None:
             return None
@@ -119,8 +122,9 @@ class PlannedFlight(NamedTuple):
 class RunPlan:
     """The answer of ``plan``: all flights in time order, and warnings.
 
-    ``min_rigid``: shorter windows are left out [time].  ``done`` are the windows in which the run was switched.
-    ``fewest_cycles`` are those of the written run, if one largest time step holds throughout, as with sensors.
+    Windows shorter than ``min_rigid`` are left out [time]. ``done`` contains the windows in which the run was switched.
+    ``fewest_cycles`` is the smallest number of cycles of the written run, if one upper limit of the time step applies
+    throughout the run, as with sensors.
     """
 
     history: History
@@ -154,7 +158,7 @@ class RunPlan:
     def next_run(self) -> tuple[Times, ...]:
         """Pairs (tr, td) of the next run's windows, including those already used [time]; empty if no window is new.
 
-        The next run starts again from the beginning, so it needs the earlier and the new windows.
+        The next run starts again from time zero, so it needs both the earlier and the new windows.
         """
         return (*self.done, *self.windows) if self.windows else ()
 
@@ -165,7 +169,7 @@ class RunPlan:
 
     @property
     def rigid_fraction(self) -> float:
-        """Fraction of the record that the windows cover that can be used without a further reference run [-]."""
+        """Fraction of the record covered by windows that can be used without a further reference run [-]."""
         return self.rigid_time / self.history.duration
 
     @property
@@ -187,16 +191,17 @@ def plan_run(
     Parameters
     ----------
     reference : Reference
-        The run, which must not be switched, except in the windows that are ``done``.
+        The run, which must not be switched outside the windows ``done``.
     settings : Settings
-        As for ``suggest``.  ``after`` applies to the flight that contains it; earlier flights are left out.
+        Settings as for ``suggest``. ``after`` applies to the flight that contains this time; earlier flights are left
+        out.
     min_rigid : float, optional
-        Shorter windows are left out [time].  Default: 5 % of the record; then a window that locks in energy is also
-        left out for one after it that is rigid for more than twice as long.
+        Shorter windows are left out [time]. The default is 5 % of the record; a window that freezes energy is then also
+        left out if a later one is rigid for more than twice as long.
     done : sequence of (float, float)
         Windows in which the run was switched, in order [time].
     before : Reference, optional
-        The run that these were planned from: its landings show how far those of this run have moved.
+        The run from which these windows were planned; its landings show by how much those of this run have shifted.
 
     Returns
     -------
@@ -287,8 +292,8 @@ def _suggest_window(
 ) -> PlannedFlight:
     """Complete a row of the plan with the window suggested for a flight that starts after the previous landing.
 
-    The energy alone shows a different start of the flight to each td, and some td show an oscillator that others do
-    not: the row has the flight as seen from the chosen td.
+    If only the energy shows the flight, its start depends on td, and an oscillator is found for some td but not for
+    others. Therefore the row contains the flight that belongs to the chosen td.
     """
     is_after_here = (
         settings.after is not None and row.start <= settings.after <= row.end
@@ -333,7 +338,7 @@ def _explain_short_window(rigid: float, shortest: float, margin: Margin) -> str:
     """Explain that a window is too short."""
     if np.isinf(margin.time):
         return (
-            "too short: a switch may shift the landing by more than the duration of the flight, so no margin before "
+            f"{TOO_SHORT}: a switch may shift the landing by more than the duration of the flight, so no margin before "
             "the contact is long enough; a given margin (`margin`) is used as it is"
         )
     if margin.time:
@@ -341,7 +346,7 @@ def _explain_short_window(rigid: float, shortest: float, margin: Margin) -> str:
     else:
         margin_text = ""
     return (
-        f"too short: rigid for {max(rigid, 0.0):.3g}{margin_text}; the shortest window allowed is "
+        f"{TOO_SHORT}: rigid for {max(rigid, 0.0):.3g}{margin_text}; the shortest window allowed is "
         f"{shortest:.3g} (`min_rigid`)"
     )
 

@@ -59,10 +59,10 @@ _HIDDEN: Final = 2.0
 def bound_rigid_times(situation: Situation, times: Samples) -> Samples:
     """Return upper bounds of the rigid time of the recommended tr at each td of ``times``, shape (n,) [time].
 
-    If only the level decides, that tr does not lie before the energy first comes near the level at td. "Near" is the
-    tolerance, or the margin of like levels if the energy passes the level itself and turns twice before td.  If a model
-    of the vibration decides at some td, or the level is round-off, the bound is the start of the flight.  The result is
-    0 if that start is unknown.
+    If pairs are judged by the level, the recommended tr is not earlier than the first time at which the energy is near
+    that at td. "Near" means within the tolerance; if the energy crosses the level and has two extrema before td, it
+    means that the levels are treated as equal. If pairs are judged by a model of the vibration at some td, or if the
+    level is round-off, the earliest tr is the start of the flight. The result is 0 if this start is unknown.
     """
     start = situation.earliest_tr
     history = situation.history
@@ -100,8 +100,8 @@ def _find_first_near(
 ) -> Samples:
     """Return, for each level, the index of the first state at which the energy reaches it (n if it never does).
 
-    ``lowest`` and ``highest`` are the extremes of the energy up to each state.  ``near`` is the largest level error
-    that counts as near; if it is negative, the energy must have been on both sides of the level.
+    ``lowest`` and ``highest`` are the extrema of the energy up to each state. ``near`` is the largest level error that
+    is treated as near; if it is negative, the energy must have been on both sides of the level.
     """
     positive = np.maximum(level, 0.0)
     low = positive * np.maximum(1 - near, 0.0) ** 2
@@ -113,7 +113,7 @@ def _find_first_near(
 class Chosen(NamedTuple):
     """The ``situation`` of the td chosen in a range, and the ``longest`` acceptable pair of this range.
 
-    ``window`` is the requested window, ``inside`` the part of it that keeps the margin [time].
+    ``window`` is the requested window, and ``inside`` the part of it that keeps the margin [time].
     """
 
     situation: Situation
@@ -139,18 +139,18 @@ def choose_td(
 ) -> Chosen:
     """Choose td in ``window``, or in the longest flight if ``window`` is None, with a tr no earlier than ``since``.
 
-    Of the pairs at all energy peaks only those of like quality are considered, and of these only those whose tr is most
-    certain; the one with the longest rigid window wins.  If deformations are known, a residual within 0.02 of the
-    smallest is of like quality.  On the energy alone, a level within the tolerance of the best one is, and the best one
-    is twice the mean energy.  The chosen td keeps the margin before the contact, unless the whole window lies in the
-    margin.  If no peak is acceptable, the ends of the window are tried.  A td of ``times`` (default: an even grid)
-    replaces the chosen one if its pair is better in both error and rigid time.  If nothing vibrates, all td are equally
-    good and the last one is chosen, since it saves most.
+    Of the pairs at all energy peaks, only those of nearly the best quality are considered, and of these only the pairs
+    whose tr is most certain; the pair with the longest rigid window is chosen. If deformations are known, a residual
+    within 0.02 of the smallest has nearly the best quality. If only the energy is known, this is a level within the
+    tolerance of the best level, which is twice the mean energy. The chosen td keeps the margin before the contact,
+    unless the whole window lies in the margin. If no peak is acceptable, the ends of the window are tried. A td of
+    ``times`` (by default, an even grid) replaces the chosen one if its pair is better in error or rigid time and worse
+    in neither. If nothing vibrates, all td are equally good, and the last one is chosen because it saves most.
 
     Raises
     ------
     RangeError
-        If the window lies outside the record, or if no window is given and nothing shows a flight.
+        If the window lies outside the record, or if no window is given and no flight is found.
     """
     if window is None:
         window = find_longest_flight(history, settings)
@@ -239,10 +239,10 @@ def _find_unbeaten(
 ) -> float:
     """Return ``td``, or one of ``times`` whose pair is better in error or rigid time and worse in neither.
 
-    Of several better td the one with the longest rigid time is returned.  The peaks were compared by one view of the
-    flight; the energy alone shows a different flight to each td.  If only pairs judged by the level (``at_level``) can
-    be compared with the pair at td, no oscillator is fitted at a td that is worse even if the oscillator is ignored.
-    No pair is rigid before ``earliest`` [time].
+    Of several better td, the one with the longest rigid time is returned. This step is needed because the peaks were
+    compared for the same flight, whereas the flight depends on td if only the energy shows it. If only pairs judged by
+    the level (``at_level``) can be compared with the pair at td, no oscillator is fitted at a td that is worse even
+    without an oscillator. No pair is rigid before ``earliest`` [time].
     """
     choice = next(iter(_select_acceptable([look(td)])), None)
     if choice is None:
@@ -279,7 +279,7 @@ def _find_unbeaten(
 def _can_beat(situation: Situation, choice: Choice, error: float) -> bool:
     """Return True if a pair at the td of a situation may be at least as good as ``choice`` in error and rigid time.
 
-    Pairs by deformations are not compared with pairs by levels.
+    Pairs judged by deformations are not compared with pairs judged by levels.
     """
     if (situation.basis == "energy") != (choice[0].basis == "energy"):
         return False
@@ -300,7 +300,7 @@ def _can_beat(situation: Situation, choice: Choice, error: float) -> bool:
 def _select_beating(choice: Choice, situations: Iterable[Situation]) -> list[Choice]:
     """Return the choices that are better than the given choice in error or rigid time and worse in neither.
 
-    Errors are compared as printed.
+    Errors are rounded as in the output before they are compared.
     """
     error = round_error(get_error_of_pair(*choice))
     rigid = choice[1].rigid_time
@@ -335,7 +335,7 @@ def find_best_known(
 def _find_latest(situation: Situation, window: tuple[float, float]) -> float:
     """Return the last td in the range that keeps the margin even after rounding to printed digits.
 
-    If no td of the window keeps it, return the last td in the flight.
+    If no td of the window keeps the margin, return the last td in the flight.
     """
     low, high = window
     margin = situation.expected_margin.time
@@ -350,7 +350,7 @@ def _find_latest(situation: Situation, window: tuple[float, float]) -> float:
 def _find_last_at_rest(situation: Situation, window: tuple[float, float]) -> float:
     """Return the last td in a range in which nothing vibrates.
 
-    This td lies before the last state, and before the contact by the time that the contact may move.
+    This td is earlier than the last state, and earlier than the contact by the time by which a switch may shift it.
     """
     history = situation.history
     flight = situation.flight
@@ -365,8 +365,8 @@ def _find_last_at_rest(situation: Situation, window: tuple[float, float]) -> flo
 def _find_flying(look: Look, window: tuple[float, float]) -> Situation:
     """Return the first situation with the most certain flight, at the start, middle or end of the range.
 
-    Of flights of equal certainty, one that covers some of the window goes before another, which only ends in it, and
-    one at a td whose deformation is known before another.
+    Of flights of equal certainty, a flight that covers a part of the window is preferred to one that only ends in it.
+    Then a td whose deformation is known is preferred.
     """
     low, high = window
     situations = []
@@ -451,9 +451,10 @@ def _choose_by_modes(
 ) -> tuple[float | None, float | None]:
     """For many modes, return the td of a long window with a small residual, and that of the longest acceptable window.
 
-    The energy at td does not matter.  Among good windows the longest one is used, since a longer rigid time is worth
-    more than a still smaller residual.  If no long window is good, a shorter good window is used.  Without any good
-    window, it is the longest of the long ones whose residual the band of the best of them leaves open.
+    The energy at td does not matter. Of the long windows that are good, one of nearly the longest is used, because a
+    longer rigid time is worth more than a still smaller residual. If no long window is good, a shorter good window is
+    used. If there is no good window, the result is the longest of the long windows that may be as good as the best one,
+    given its error band.
     """
     compared = situation.vibration.compared
     start = situation.earliest_tr
@@ -579,7 +580,7 @@ def _choose_by_level(
 def _list_by_rigid_time(
     situation: Situation, times: Iterable[float]
 ) -> Iterator[Choice]:
-    """Yield acceptable choices in descending order of the bound on their rigid time, until none can be longer."""
+    """Yield acceptable choices, largest upper bound on the rigid time first, until no other can be rigid for longer."""
     tds = np.fromiter(times, np.float64)
     longest = 0.0
     bounds = bound_rigid_times(situation, tds)

@@ -60,9 +60,9 @@ _FEWEST_STEPS: Final = 40
 class Offer(AnswerAtTd):
     """The answer of ``suggest`` for one td of the trade-off. Most values are computed only when they are used.
 
-    ``candidates`` end with the recommended one, if any.  ``peak``: the energy peaks at td.  ``unbeaten``: no other
-    offer has less error and saves as much, or saves more with no more error.  ``recommended``: it is the answer of
-    ``suggest`` if td is chosen too.
+    ``candidates`` ends with the recommended candidate, if any. ``peak`` is True if the energy has a maximum at td.
+    ``unbeaten`` is True if the offer is Pareto-optimal: no other offer is better in error or saving and worse in
+    neither. ``recommended`` is True if this is the answer of ``suggest`` when td is chosen, too.
     """
 
     situation: Situation
@@ -80,8 +80,8 @@ class Offer(AnswerAtTd):
     def error(self) -> float | None:
         """Error by which the pairs of different td are compared [-].
 
-        This error is the residual; on basis "energy" the shortfall of the level at td from the largest vibration
-        energy, 1 - sqrt(E(td)/(2 <E>)).
+        This error is the residual or, on the basis "energy", the shortfall of the level at td, 1 - sqrt(E(td)/(2 <E>)),
+        relative to the largest vibration energy.
         """
         return get_error_of_pair(self.situation, self.pair)
 
@@ -110,7 +110,7 @@ class Offer(AnswerAtTd):
     def answer(self) -> PairSuggestion:
         """The complete answer of ``suggest`` for this td.
 
-        Windows need all candidates, and the reason why no tr is recommended needs those before the flight too.
+        All candidates are needed for the windows, and those before the flight for the reason why no tr is recommended.
         """
         if self.pair:
             candidates = self.candidates
@@ -170,10 +170,11 @@ def make_offers(
 class TradeOff:
     """The answer of ``explore``: proposals for the range ``td_window`` in ascending order of td [time].
 
-    ``requested`` is the offer of the requested td, ``recommended`` that of the pair that ``suggest`` chooses in the
-    window; ``suggestion`` is that answer in full.  ``start`` is the offer that others are compared with: that of the
-    requested td, else the one that saves most.  ``step`` is the nearest offer with half the error of
-    ``start``: an energy peak, else a Pareto-optimal td, else the recommended one if its error is smaller.
+    ``requested`` is the offer for the requested td, and ``recommended`` that for the pair that ``suggest`` chooses in
+    the window; ``suggestion`` is its complete answer. ``start`` is the offer with which the others are compared: that
+    for the requested td or, if there is none, the offer that saves most. ``step`` is the nearest offer with half the
+    error of ``start``: preferably an energy peak, otherwise a Pareto-optimal td, otherwise the recommended offer if its
+    error is smaller.
     """
 
     situation: Situation
@@ -205,7 +206,7 @@ class TradeOff:
     def decide_on(self, offer: Offer) -> Decision | None:
         """Return the verdict on a proposed pair as ``suggest`` gives it, with a better pair if there is one.
 
-        If no other td is clearly better than the requested one, its cure says so.
+        If no other td is clearly better than the requested one, the advice in its verdict states this.
         """
         if offer.recommended:
             return self.suggestion.decision
@@ -231,11 +232,11 @@ def explore_run(
     reference : Reference
     settings : Settings
     td_window : (float, float), optional
-        Window for td [time].  Default: the longest flight; if there is none and td is given, the whole record.
+        Window for td [time].  The default is the longest flight or, if there is none and td is given, the whole record.
     td : float, optional
-        Requested td, which others are compared with [time].
+        Requested td, with which others are compared [time].
     steps : int
-        Number of td on an even grid, to which every energy peak is added.  If there are more peaks than that, the
+        Number of td on an even grid, to which every energy peak is added. If there are more peaks than grid points, the
         highest peak in each interval of the grid replaces the grid point.
     since : float, optional
         No flight is assumed to begin before this time [time].
@@ -330,9 +331,10 @@ def _mark_unbeaten(offers: Sequence[Offer]) -> Iterator[Offer]:
 
 
 def _find_step(start: Offer, offers: Sequence[Offer]) -> Offer | None:
-    """Return the nearest proposal with half the error or, failing that, the recommended proposal if it is better.
+    """Return the proposal closest to ``start`` with at most half its error, else the recommended one if it is better.
 
-    Like ``suggest``, it tries the energy peaks first; if there is no energy peak, it takes a Pareto-optimal offer.
+    Like ``suggest``, this function tries the energy peaks first. If no peak is suitable, it returns a Pareto-optimal
+    offer.
     """
     error = np.inf if start.error is None else start.error
     least_time = _LEAST_KEPT * (start.rigid_time or 0.0)
@@ -372,11 +374,13 @@ def _warn_about_window(
         caution for caution in warn_about_td(situation) if caution.code not in of_td
     )
     if inside[1] < window[1]:
-        kept_clear = window[1] - inside[1]
-        yield Caution(
-            "margin-kept",
-            f"td is at most {inside[1]:.6g}: a margin of {kept_clear:.3g} is kept before {window[1]:.6g}",
-        )
+        contact = situation.flight.end
+        if contact is not None and inside[1] < contact:
+            kept_before, limit = f"the contact at {contact:.6g}", contact
+        else:
+            kept_before, limit = f"{window[1]:.6g}", window[1]
+        margin = f"a margin of {limit - inside[1]:.3g} is kept before {kept_before}"
+        yield Caution("margin-kept", f"td is at most {inside[1]:.6g}: {margin}")
     if not any(map(_is_comparable, offers)):
         nothing = "no td in the range has an admissible tr"
         yield Caution("no-candidate", f"{nothing}{_explain_by_limits(suggestion)}")
@@ -431,9 +435,9 @@ def explore_around(
     situation : Situation
         Describes the requested or chosen td.
     window : (float, float), optional
-        Window in which td was chosen [time].  Default: the flight that td lies in.
+        Window in which td was chosen [time].  The default is the flight that contains td.
     steps : int, optional
-        Number of td on an even grid.  Default: as many as a page needs.
+        Number of td on an even grid.  The default is the number that a page needs.
     since : float, optional
         No flight is assumed to begin before this time [time].
 

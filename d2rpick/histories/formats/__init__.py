@@ -1,7 +1,7 @@
 """List the file formats of histories; each format has one line in `READERS` and one module.
 
-A reader is imported only when a file may have its format. Help texts list the formats without importing their
-readers, which keeps start-up short.
+A reader is imported only when a file may have its format. Help texts list the formats without importing their readers,
+which keeps start-up fast.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ FAMILIES: Final = ("d3thdt", "d3plot")
 class Listed(NamedTuple):
     """A file format, described without importing its reader ``module``.
 
-    The regular expression ``hint`` matches in the first bytes of each file of the format. ``files`` matches the file
-    names that the ``solver`` uses; its group ``root`` is the name of the run if the solver puts it into the file
-    name. Only files of a solver have an energy balance and one common time. A format that belongs to no solver holds
-    columns named by a user.
+    The regular expression ``hint`` finds a match in the first bytes of each file of the format. ``files`` matches the
+    file names that the ``solver`` uses; its group ``root`` is the name of the run if the solver puts it into the file
+    name. Only solver files have an energy balance and common times of all columns. Files of a format without a
+    ``solver`` contain columns that a user has named.
     """
 
     module: str

@@ -1,8 +1,8 @@
 """Read LS-DYNA's binout: the branches glstat (whole model) and matsum (parts) of one restart segment of a run.
 
-A branch has a directory ``metadata`` (title, version, part ids, part titles) and one directory per state,
-``d000001`` and so on, of variables such as ``internal_energy``: one value in glstat, one per part in matsum.
-A run may spread its branches over several files and continue a file in ``%001``, ``%002``.
+A branch has a directory ``metadata`` (title, version, part ids, part titles) and one directory per state, ``d000001``
+and so on, with variables such as ``internal_energy``: one value in glstat, one value per part in matsum. A run may
+distribute its branches over several files and continue a file in ``%001``, ``%002``.
 """
 
 from __future__ import annotations

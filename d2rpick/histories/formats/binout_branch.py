@@ -1,7 +1,8 @@
 """Read one branch of LS-DYNA's binout: its states in all files of a family, grouped by file and layout.
 
-A column is gathered with a few array operations, however many states there are. Anything inconsistent - a variable or
-a part that one state lacks, a count that changes - is refused with the state named, never shifted.
+A column is collected with a few array operations, regardless of the number of states. If states are inconsistent (a
+variable or a part is missing in a state, or a count changes), the branch is refused with the number of the state;
+values are never shifted.
 """
 
 from __future__ import annotations
@@ -104,11 +105,11 @@ def _group_states(
 class Branch(Database):
     """The states of one branch in all files of a family; the object is falsy if no file contains the branch.
 
-    A solver numbers its states consecutively. If a file begins with a higher number than the one after the last
-    state, a file of the family is missing. A repeated number begins a newer leg, which writes the same variables:
-    either the same states again or the next ones, as their times show. A number left out inside a file, a name twice
-    in one state and a leg with other variables show that records are lost or out of place: a state may then be made
-    of two.
+    A solver numbers its states consecutively. If the first number in a file is too high, a file of the family is
+    missing. A repeated number is the start of a newer restart segment, which contains the same variables, either for
+    the same states again or for the next ones; their times show which. A number missing inside a file, a name that
+    occurs twice in a state, or a restart segment with other variables show that records are lost or misplaced, so that
+    a state may be a mixture of two.
 
     Parameters
     ----------
@@ -121,7 +122,7 @@ class Branch(Database):
     Attributes
     ----------
     damage : str
-        Where records are lost or out of place, so that no state can be trusted; empty if nowhere.
+        Where records are lost or misplaced, so that no state can be trusted; empty if there is no damage.
     """
 
     def __init__(self, name: str, files: Sequence[Lsda], *, by_part: bool) -> None:
@@ -311,7 +312,7 @@ class Branch(Database):
     def checked(self, name: str) -> Iterator[tuple[Group, Variable]]:
         """Yield each group of states with its variable of this name.
 
-        A count that fits neither the parts nor the other states shows that records of two states were merged; then no
+        If the number of values fits neither the parts nor the other states, records of two states were merged, and no
         value of the state can be trusted.
         """
         for group in self._groups:

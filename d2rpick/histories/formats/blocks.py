@@ -45,9 +45,9 @@ class BlockLayout(NamedTuple):
     """The layout of a block of text: the position of each number in it.
 
     ``fields`` maps the name of a number to its offset in the block, or to UNSURE. ``literal``, shape (size of the
-    block,), is 255 for the bytes that all blocks of this layout share, line ends among them, and 0 for the others, so
-    that no line of a block can be hidden between literal bytes. ``last`` is the name of the last number of the block.
-    ``broken_off`` is True if the head of another run follows instead of the next block.
+    block,), is 255 for the bytes that all blocks of this layout have in common, including all line ends, and 0 for the
+    others; therefore no additional line can remain undetected. ``last`` is the name of the last number of the block.
+    ``broken_off`` is True if the header of another run follows instead of the next block.
     """
 
     fields: Mapping[Any, int]
@@ -60,12 +60,12 @@ class Grammar(NamedTuple):
     """Description of the blocks of a file format, with everything that is needed to read a file.
 
     ``start`` is the text at the start of a block; ``lines`` matches the known lines. ``describe`` takes a block and
-    these lines, returns the offsets of its numbers and the name of the last one, and sets the columns of the numbers
-    in ``literal`` to 0. ``changing`` matches what may differ between blocks in other lines: short pieces only, so
-    that no whole line is ignored. ``time`` is the name of the first number. ``whole`` returns True if the only block
-    of a file is known to be whole. Numbers have ``width`` columns and ``decimals`` decimals. If ``compare_all`` is
-    True, every block is compared in full when the file is opened; otherwise, if all blocks have one size, only their
-    first lines are compared, and the rest when it is read.
+    these lines, returns the offsets of its numbers and the name of the last one, and sets the columns of the numbers in
+    ``literal`` to 0. ``changing`` matches the text in other lines that may differ between blocks; it matches only short
+    pieces, so that no complete line is ignored. ``time`` is the name of the first number. ``whole`` returns True if the
+    only block of a file is known to be complete. Numbers have ``width`` columns and ``decimals`` decimals. If
+    ``compare_all`` is True, all blocks are compared completely when the file is opened. Otherwise, if all blocks have
+    the same size, only their first lines are compared at that time, and the rest when it is read.
     """
 
     start: bytes
@@ -104,9 +104,9 @@ def read_head_of_listing(data: bytes | Content) -> tuple[str, str, int]:
     Returns
     -------
     title, version : str
-        Empty if the file has no head.
+        Title of the run and version of the solver; both are empty if the file has no header.
     begin : int
-        Address after the head [byte].
+        Offset of the first byte after the header.
     """
     lines = data[:4096].split(b"\n")
     if len(lines) < 3 or b"ls-dyna" not in lines[1]:
@@ -140,13 +140,13 @@ def count_like_example(
     data : Content
     run : Stretch
     offset : int
-        Byte of the blocks at which the comparison starts.
+        Offset in the blocks at which the comparison starts [bytes].
     literal : array of shape (size,)
-        255 for the bytes that must be those of the example, 0 for the others.
+        255 for the bytes that must equal those of the example, 0 for the others.
     varied : array of shape (size,), optional
-        Is set to the bits in which a byte of any counted block differs from the example.
+        Array that is set to the bits in which a byte of any counted block differs from the example.
     take : callable, optional
-        Is called with these bytes of the counted blocks, shape (count, size), some blocks at a time.
+        Function that is called with these bytes of the counted blocks, shape (count, size), some blocks at a time.
 
     Examples
     --------
@@ -222,7 +222,7 @@ def count_repetitions(
     data : Content
     begin : int
     fixed : array of shape (size,)
-        255 for each byte of structure and 0 for each byte of data.
+        255 for each byte that belongs to the structure, and 0 for each byte of data.
     numbers : sequence of (int, int)
         Offset and width of the decimal state numbers; each grows by its own constant step from block to block.
 
@@ -282,7 +282,7 @@ def _decode_state_numbers(
 def _make_scales(decimals: int) -> tuple[Samples, Samples]:
     """Return the factor and the divisor of an integer mantissa for each exponent and sign; one of them is always 1.
 
-    Factor and divisor are NaN if the conversion would be inexact.
+    Both are NaN if the conversion would be inexact.
     """
     exponent = np.arange(_SHRINKS) * [[1], [-1]] - decimals
     powers = np.array([float(f"1e{size}") for size in range(_EXACT + 1)] + [np.nan])[
@@ -315,15 +315,16 @@ def parse_fortran_number(text: bytes) -> float:
 def parse_fortran_numbers(fields: NDArray[np.bytes_], decimals: int) -> Samples:
     """Return the values of fixed-width fields as ``float()`` would; NaN for a field that is not a number.
 
-    Fields of the usual shape, ``-d.dddddE+dd`` right-justified, are converted together: mantissa and power of ten are
-    both exact doubles, so their product or quotient is correctly rounded. ``number`` converts all others.
+    Right-justified fields of the usual form ``-d.dddddE+dd`` are converted together: the mantissa and the power of ten
+    are both exact doubles, so their product or quotient is correctly rounded. `parse_fortran_number` converts all other
+    fields.
 
     Parameters
     ----------
     fields : array of bytes of one width, shape (n,)
-        As written in the file.
+        Fields as written in the file.
     decimals : int
-        Decimals in the usual shape.
+        Number of decimals in the usual form.
 
     Returns
     -------

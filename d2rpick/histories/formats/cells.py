@@ -166,7 +166,7 @@ def is_missing(cell: str) -> bool:
 def is_word(cell: str) -> bool:
     """Return True if a cell that is not a number is a word, date, clock time or percentage.
 
-    A word begins with a letter: "5 load 1" is what a wrong separator cuts out of "0,5 load 1,5".
+    A word begins with a letter, because a wrong separator may cut cells such as "5 load 1" out of "0,5 load 1,5".
     """
     return cell[0].isalpha() or _DATE_OR_SHARE.fullmatch(cell) is not None
 
@@ -174,7 +174,7 @@ def is_word(cell: str) -> bool:
 def find_thousands(cells: Sequence[str], decimal: str) -> str:
     """Return the thousands separator that the cells prove; empty if no cell proves one.
 
-    A cell proves it with a decimal sign too, or with two such separators: "1.234" alone may be either.
+    A cell proves it if it also has a decimal sign, or two such separators; "1.234" alone is ambiguous.
 
     Examples
     --------

@@ -111,8 +111,8 @@ def find_time_column(
 ) -> tuple[int, list[str]]:
     """Return the time column and notes on assumptions. If curves stand side by side, the first energy's time is used.
 
-    If no column has the name of a time, return the first ``numeric`` column that is neither a known quantity nor
-    named like row numbers.
+    If no column has the name of a time, the first ``numeric`` column is returned whose name denotes neither a known
+    quantity nor row numbers.
     """
     if wanted is not None:
         return find_column(source, layout, wanted), []

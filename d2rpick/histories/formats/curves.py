@@ -1,9 +1,10 @@
 """Read text files that list curves one after another, each with its own times, as exported by postprocessors.
 
-LS-PrePost's Curveplot: a head of word, title, x label, y label; for each curve ``name #pts=number``, lines with a
-star, pairs of numbers and ``endcurve``. LS-PrePost's XY pairs: a line with the number of pairs, then the pairs. T/HIS
-``.cur``: title, x label, y label, name and pairs, ``CONTINUE`` between curves, comments with a dollar sign; the Oasys
-programs write type and factor after a label. DYNAFORM: the number of curves; for each ``number 'name'`` and pairs.
+A Curveplot file of LS-PrePost has a header (word, title, x label, y label); each curve consists of ``name
+#pts=number``, lines with a star, pairs of numbers, and ``endcurve``. A file with XY pairs of LS-PrePost has a line with
+the number of pairs, followed by the pairs. A ``.cur`` file of T/HIS has title, x label, y label, name and pairs, with
+``CONTINUE`` between curves and comments that begin with a dollar sign; the Oasys programs write a type and a factor
+after a label. A DYNAFORM file begins with the number of curves; each curve consists of ``number 'name'`` and pairs.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """Read d3plot and d3thdt of LS-DYNA: energies, velocities and masses of the model and its parts in each state.
 
-A run writes a family of files. The first file, d3plot, contains the head, the geometry and perhaps states; d3plot01,
-d3plot02 and so on contain whole states only. A state is its time, the values of the model and of the parts, and then
-the nodes and elements, which are most of it and are skipped. The files of a family are recognised by their names,
-since only the first one identifies itself; a restart may leave numbers out.
+A run writes a family of files. The first file, d3plot, contains the header, the geometry and possibly states; d3plot01,
+d3plot02 and so on contain only complete states. A state contains its time, the values of the model and of the parts,
+and then those of the nodes and elements, which are the largest part and are skipped. The files of a family are
+recognised by their names, because only the first file has a header; a restart may skip numbers.
 """
 
 from __future__ import annotations
@@ -159,7 +159,7 @@ class D3plot(Database):
         Raises
         ------
         FormatError
-            If a part is not in the file, or has not this quantity.
+            If the file does not contain a part, or a part does not have this quantity.
         """
         if not self.parts:
             raise FormatError(self.no_parts)

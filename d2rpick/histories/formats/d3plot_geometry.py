@@ -1,6 +1,6 @@
 """Skip the sections between the control words and the states of a d3plot: nodes, elements, part ids and titles.
 
-Only sections that describe the states are read; the others are skipped by the lengths that the control words give.
+Only sections that describe the states are read; the others are skipped according to the lengths in the control words.
 """
 
 from __future__ import annotations
@@ -41,8 +41,9 @@ _MOST_TITLES: Final = 1_000_000
 class Geometry:
     """The sections between the control words and the titles, skipped one after another.
 
-    ``at`` is the word at which the next section begins. ``part_ids`` are the ids of the parts, first sorted, then in
-    the order of their definition; empty if the file has none. The other attributes count the values in a state.
+    ``at`` is the index of the word at which the next section begins. ``part_ids`` contains the ids of the parts, first
+    in ascending order, then in the order of their definition; it is empty if the file has none. The other attributes
+    are numbers of values in a state.
     """
 
     def __init__(self, words: Words, control: Mapping[str, int]) -> None:

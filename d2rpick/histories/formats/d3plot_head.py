@@ -42,8 +42,8 @@ _THERMAL: Final = {0: 0, 1: 1, 2: 4, 3: 6}
 class Head(NamedTuple):
     """The layout of the states of a family, as given in the header of the family's first file.
 
-    States begin at byte ``begin`` of it; each has ``state`` bytes. In a state, ``globals`` words follow the time: the
-    values of the model, ``part_values`` quantities of each part, and the forces of ``walls`` rigid walls.
+    The states begin at byte ``begin`` of this file; each has ``state`` bytes. In a state, ``globals`` words follow the
+    time: the values of the model, ``part_values`` quantities of each part, and the forces of ``walls`` rigid walls.
     ``no_parts`` is the reason why there are no parts, if there are none.
     """
 
@@ -65,7 +65,7 @@ def read_d3plot_head(content: Content, source: str) -> Head:
     Raises
     ------
     FormatError
-        If the file ends within its head, is packed by femzip, or a section does not end where it should.
+        If the file ends within its header, is packed by femzip, or has a section of unexpected length.
     """
     form = detect_form(content[:HEAD])
     if form is None:
@@ -120,7 +120,7 @@ def _count_parts(control: Mapping[str, int]) -> int:
 def _order_ids(geometry: Geometry, titles: Titles, number: int) -> tuple[int, ...]:
     """Return the part ids in the order in which the part values are stored.
 
-    A file of parts that are numbered consecutively has no list of their ids; the titles have their ids too.
+    If the parts are numbered consecutively, the file has no list of their ids; the titles contain the ids, too.
     """
     titled = tuple(titles.of_parts)
     lists = geometry.part_ids or (tuple(range(1, number + 1)),)

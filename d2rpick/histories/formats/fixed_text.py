@@ -1,10 +1,10 @@
 """Read solver text files that consist of fixed-column blocks.
 
-glstat and matsum contain one block for each state. Most blocks of a file have the same lines, hence the same number
-of bytes. So a block is parsed line by line once; the blocks after it are only compared with it, byte by byte where
-the text must be the same (labels, part numbers, line ends), and their numbers are then read by address. A block that
-differs is parsed itself. The comparison also shows which numbers are the same in all blocks (for instance those of a
-part at rest); these are read once.
+A glstat or matsum contains one block for each state. Most blocks of a file have the same lines and therefore the same
+number of bytes. Only the first of such blocks is parsed line by line. The following blocks are compared with it, byte
+by byte where the text must be the same (labels, part numbers, line ends), and their numbers are then read from the same
+offsets. A block that differs is parsed itself. The comparison also shows which numbers are the same in all blocks (for
+instance those of a part at rest); these are read only once.
 """
 
 from __future__ import annotations
@@ -50,22 +50,23 @@ class Blocks(Database):
     Parameters
     ----------
     data : bytes or Content
-        The file.
+        Content of the file.
     source : str
         Name of the format, for messages.
     grammar : Grammar
-        What a block looks like.
+        Description of the blocks.
     ahead : sequence of names, optional
-        Names of numbers that are needed first, all together: they are copied while all blocks are compared.
+        Names of numbers that are needed first and together; they are copied while the blocks are compared.
 
     Attributes
     ----------
     states : int
         Number of complete states.
     tail : int
-        Address of the last block of the file, complete or not; the address after the head if there is no block.
+        Offset of the last block of the file, whether or not it is complete; the offset after the header if there is no
+        block.
     rest : Stretch or None
-        The last block if the file ends within it: it is a state only after ``admit_rest``.
+        The last block if the file ends within it; it becomes a state only if ``admit_rest`` is called.
     """
 
     # Short sequences of equal blocks do not store the positions of differing bytes, which saves memory.
@@ -122,13 +123,13 @@ class Blocks(Database):
     ) -> Samples:
         """Return the named numbers in all states, shape (states, len(names)).
 
-        ``anchors`` are, for each number, the field or line from which on the text is compared before the number is
-        trusted; they are used in files that were not compared in full when they were opened.
+        ``anchors`` contains, for each number, the field or line from which the text is compared before the number is
+        used; they are needed for files that were not compared completely when they were opened.
 
         Raises
         ------
         FormatError
-            If a state lacks one of the numbers, has it twice, or has something else in its place.
+            If a number is missing in a state, occurs twice, or is replaced by other text.
         """
         is_checked = self._compared or not anchors
         if not is_checked and (self._trusted or not self._alike(names, anchors)):
@@ -212,7 +213,7 @@ class Blocks(Database):
     def _read(
         self, values: Samples, run: Stretch, offsets: Addresses, taken: Fields | None
     ) -> None:
-        """Read the numbers of many equal blocks. Copied numbers are reused, and constant numbers are read only once."""
+        """Read the numbers of many blocks of the same layout. A field that never changes is read only once."""
         varied_before = np.append(0, np.cumsum(self._varied[run.start] != 0))
         moves = varied_before[offsets + self._grammar.width] > varied_before[offsets]
         still = self._decoded(run.start + offsets[~moves])
@@ -239,7 +240,7 @@ class Blocks(Database):
         )
 
     def _refuse_odd(self, values: Samples, names: Sequence[Hashable]) -> None:
-        """Raise FormatError, with the line number, for the first value (states, len(names)) that is not a number."""
+        """Raise FormatError with the line of the first value of ``values`` (states, len(names)) that is no number."""
         odd = np.isnan(values)
         if not odd.any():
             return
@@ -307,7 +308,7 @@ class Blocks(Database):
     def _is_whole(self, layout: BlockLayout, previous: BlockLayout | None) -> bool:
         """Return True if a block is complete, i.e. contains the number that ends the previous block.
 
-        If there is no previous block, the grammar decides.
+        If there is no previous block, ``whole`` of the grammar decides.
         """
         if previous is None:
             return self._grammar.whole(layout)
@@ -325,7 +326,7 @@ class Blocks(Database):
     def _known(
         self, position: int, recent: list[tuple[int, int]]
     ) -> tuple[int, int, int] | None:
-        """Return example, stride and count of the blocks at ``position`` if their layout is recent, otherwise None."""
+        """Return the example, stride and number of blocks at ``position`` if ``recent`` has their layout, else None."""
         start = self._grammar.start
         for example, stride in recent:
             if self.text(position + stride, len(start)) == start:
@@ -415,7 +416,8 @@ class Blocks(Database):
     def _alike(self, names: Sequence[Hashable], anchors: Sequence[Hashable]) -> bool:
         """Return True if all blocks equal their examples from the first anchor to the last requested number.
 
-        Return False unchecked if that is most of a block: comparing whole blocks costs no more.
+        Return False without a comparison if this is most of a block, because comparing complete blocks then takes no
+        longer.
         """
         return all(
             self._alike_in(run, self._offsets(run, names), anchors) for run in self

@@ -1,8 +1,8 @@
 """Read LS-DYNA's glstat: one block of ``label....... value`` lines per state, for the whole model.
 
-A label occupies columns 2-32, padded with dots; its value is right-justified in columns 33-46. Labels are compared as
-a whole: ``internal energy`` also ends ``eroded internal energy``. A block begins at its ``time....`` line; the line
-before it, which names the element that controls the time step, has too many forms to rely on.
+A label occupies columns 2-32, padded with dots; its value is right-justified in columns 33-46. Complete labels are
+compared, because ``eroded internal energy`` ends with ``internal energy``. A block begins with its ``time....`` line;
+the line before, which names the element that controls the time step, has too many forms to be recognised reliably.
 """
 
 from __future__ import annotations
@@ -70,8 +70,8 @@ def open_legs(sources: Sequence[Source], selection: Selection) -> list[Glstat]:
 class Glstat(Blocks):
     """One glstat file, as a ``Database`` without parts.
 
-    A last state within which the file ends is used if it has the lines that are ``needed``. Raises FormatError if
-    there is neither a head nor a state, or if a time is not a number.
+    If the file ends within the last state, this state is used if it has the lines that are ``needed``. Raises
+    FormatError if there is neither a header nor a state, or if a time is not a number.
     """
 
     format, digits = "glstat", 6
@@ -156,7 +156,7 @@ def _describe_glstat_block(
         literal[line.start(2) : line.start(2) + _WIDTH] = 0
         is_mixed |= name in fields
         fields[name] = line.start(2)
-    if is_mixed:  # Any line of the block may belong to another state.
+    if is_mixed:  # The block may mix lines of two states.
         fields = {
             name: offset if name == _TIME else UNSURE for name, offset in fields.items()
         }

@@ -1,7 +1,7 @@
 """Find the columns of an HDF5 file (datasets, matrices, compound types, pandas tables) and read their values.
 
-The library returns zeros for data that were never written, and does not notice a damaged type: both are checked here.
-A changed byte in data without a checksum (`fletcher32`, or the one of gzip) cannot be detected.
+The library returns zeros for data that were never written, and does not detect a damaged type; this module checks both.
+A changed byte in data without a checksum (`fletcher32` or gzip) cannot be detected.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ _LARGE: Final = 1 / 4
 class Column(NamedTuple):
     """One column of an HDF5 file: the ``path`` by which a user names the column, and its position in the file.
 
-    ``field`` is the member of a compound dataset, ``place`` the (axis, index) of the column in a matrix.
+    ``field`` is the member of a compound dataset, and ``place`` the (axis, index) of the column in a matrix.
     """
 
     path: str
@@ -259,9 +259,9 @@ def _list_matrix_columns(
 def _list_erf_columns(name: str, block: h5py.Group) -> Iterator[Column]:
     """Yield the columns of a time history in ERF-HDF5 (VPS), such as ``.../MODEL/INTERNAL_ENERGY/ZONE1/erfblock``.
 
-    ``res`` has shape (states, entities, components), ``indexval`` the times and ``entid`` the numbers of the
-    entities. Only quantities of one component are columns. Columns of entities other than the model have the number
-    in their path.
+    ``res`` has the shape (states, entities, components); ``indexval`` contains the times, and ``entid`` the ids of the
+    entities. Only quantities with one component are columns. The paths of columns contain the id of the entity unless
+    it is the model.
     """
     results, times, entities = (block.get(key) for key in ("res", "indexval", "entid"))
     if (

@@ -1,7 +1,7 @@
 """Read HDF5 files: time and energy columns in any layout, and binouts saved by lasso-python.
 
-A file with the branches of a binout is treated as a saved binout. Of any other file, columns are chosen by their
-paths; if the user chooses no column, the only column that fits is used, and if several fit the message lists them.
+A file with the branches of a binout is treated as a saved binout. In any other file, columns are selected by their
+paths. If the user selects no column, the only suitable column is used; if there are several, the message lists them.
 """
 
 from __future__ import annotations
@@ -412,8 +412,8 @@ def _open_hdf5(file: io.BytesIO, source: str) -> Iterator[h5py.File]:
 def check_file(file: BinaryIO, source: str, seconds: int = _SECONDS) -> None:
     """Raise FormatError if a file is truncated or too large, or if the library would crash on it.
 
-    The file is read once in a child process whose time is limited to ``seconds`` plus 1 s per 100 kB, since a reading
-    that crashes or never ends there would do so here.
+    The file is first read in a child process whose time is limited to ``seconds`` plus 1 s per 100 kB, because a read
+    that crashes or never ends would otherwise affect this process.
     """
     _check_size_of_file(file, source)
     if not hasattr(os, "fork"):

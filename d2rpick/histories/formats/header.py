@@ -61,14 +61,14 @@ def read_header(
     lines : sequence of str
         All lines above the first row.
     separator : str or None
-        Character between the cells; None means blanks.
+        Character between the cells; None stands for spaces.
     columns : int
-        How many values each row has.
+        Number of values in each row.
 
     Raises
     ------
     FormatError
-        If the names belong to other columns than the rows have.
+        If the names do not belong to the columns of the rows.
     """
     rows = list(_split_rows(lines, separator, columns))
     units: tuple[str, ...] = ()

@@ -48,7 +48,7 @@ _LINES_SEARCHED = (_LOOK_AT, 600, HEAD)
 class Layout(NamedTuple):
     """The layout of a table whose rows begin at line index ``start`` and have ``columns`` values each.
 
-    ``names`` and ``units`` are empty if the file has none. If there are more or fewer names than columns, only the
+    ``names`` and ``units`` are empty if the file contains none. If the numbers of names and columns differ, only the
     first ``sure`` columns may be used. ``title`` is the name of the curve in the file, apart from the name of its
     column. ``thousands`` is the thousands separator, if there is one.
     """
@@ -114,7 +114,7 @@ def find_layout(text: Text) -> Layout:
     Raises
     ------
     FormatError
-        If the lines are no table, or one whose columns cannot be told for sure.
+        If the lines are not a table, or if the columns of the table are ambiguous.
     """
     lines = text.head
     lines_with_last = [*lines, text.unended] if text.is_short else [*lines]

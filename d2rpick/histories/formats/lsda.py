@@ -1,14 +1,13 @@
 """Read LSDA, the container format of LS-DYNA's binout: directories of typed variables, found by reading all records.
 
-The file begins with the length of its header, the sizes of length, offset, command and type fields, the byte order
-(1: little-endian) and the float format. Records follow, each of length, command and body:
+The file begins with the length of its header, the sizes of length, offset, command and type fields, the byte order (1:
+little-endian) and the float format. Records follow, each of which consists of a length, a command and a body. A record
+is a change of directory (absolute, or relative to the current one), a variable (type, length of the name, name,
+values), or a symbol table, which lists the positions of the variables after every flush.
 
-* a change of directory, absolute or relative to the last one; * a variable: its type, the length of its name, the
-name, the values; * symbol tables, which list the positions of the variables after every flush.
-
-The symbol tables are not used: they form a chain that is broken after a killed run, while the records are whole up to
-the byte at which the run stopped. Most files repeat one pattern of records at a constant stride; `repeats` compares
-whole blocks instead of single records.
+The symbol tables are not used, because they form a chain that is incomplete after a killed run, whereas the records are
+complete up to the byte at which the run stopped. Most files repeat a pattern of records at a constant stride, so whole
+blocks are compared instead of single records.
 """
 
 from __future__ import annotations
@@ -82,8 +81,8 @@ class DirectoryLayout(NamedTuple):
 class _Form(NamedTuple):
     """The records of a directory as one integer, which can be compared quickly with those of another directory.
 
-    ``heads`` are the records without their values; ``fixed`` are these bytes at their positions, ``mask`` selects
-    them from ``length`` bytes.
+    ``heads`` contains the records without their values. ``fixed`` contains the same bytes at their positions, and
+    ``mask`` selects them from ``length`` bytes.
     """
 
     heads: tuple[bytes, ...]
@@ -95,7 +94,7 @@ class _Form(NamedTuple):
 class _Directory(NamedTuple):
     """A directory that is being read; its records begin at the byte ``start``.
 
-    ``number`` is that of the state, -1 if the directory is no state.
+    ``number`` is the number of the state; -1 if the directory is not a state.
     """
 
     path: tuple[str, ...]
@@ -119,11 +118,11 @@ class Lsda:
     Parameters
     ----------
     content : bytes or Content
-        The whole file.
+        Content of the file.
     source : str
         Name of the file, for messages.
     branches : collection of str
-        Paths of the directories whose states and variables are wanted; of the others only the names are kept.
+        Paths of the directories whose states and variables are wanted; only the names of the others are kept.
 
     Attributes
     ----------
@@ -138,9 +137,9 @@ class Lsda:
     names : set of str
         All top-level directories.
     stop : str
-        Why the walk ended before the end of the file; empty if it did not.
+        Reason why reading stopped before the end of the file; empty if the file was read to its end.
     unfinished : str
-        The branch whose last state ends the records, so that further variables may be missing.
+        Branch to whose last state the last record belongs, so that further variables of this state may be missing.
 
     Raises
     ------
@@ -181,7 +180,7 @@ class Lsda:
     def find_resume_point(self, branches: Collection[str]) -> ResumePoint:
         """Return the position at which a later read can begin: the earliest second-to-last state of all branches.
 
-        The head repeats the metadata of all wanted branches, each behind a change to its directory.
+        Its header repeats the metadata of all wanted branches, each after a change to its directory.
         """
         head = self.data[: self._begin]
         for branch, visits in self.metadata.items():
@@ -287,7 +286,8 @@ class Lsda:
     def _goes_on(self, last_bytes: bytes, heads: set[bytes]) -> bool:
         """Return True if the file was truncated within the record ``last_bytes``; False if this record is damaged.
 
-        Records of a state have the heads of the last state, but symbol tables differ from each other.
+        The truncated record must have the head of the corresponding record of the last state; symbol tables are not
+        compared, because they differ from each other.
         """
         if any(head.startswith(last_bytes) for head in heads):
             return True

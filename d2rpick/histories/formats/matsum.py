@@ -1,8 +1,8 @@
 """Read LS-DYNA's matsum, which contains one block per state with three or four lines per part.
 
-The lines of a part begin with ``mat.#=``. Numbers have 13 columns after their name and an equals sign; which names
-there are depends on the version. A legend at the top lists the titles by part number. A part may be in some states
-only: a note names it, and it is refused if it is requested, since its column would have holes.
+The lines of a part begin with ``mat.#=``. Numbers have 13 columns after their name and an equals sign; the names depend
+on the version. A legend at the top lists the titles by part number. If a part occurs only in some states, a note names
+it, and a request for it is refused, because its column would have gaps.
 """
 
 from __future__ import annotations
@@ -92,7 +92,7 @@ def open_legs(sources: Sequence[Source], _: Selection) -> list[Matsum]:
 class Matsum(Blocks):
     """One matsum file, as a ``Database`` without whole-model channels.
 
-    Raises FormatError if it has neither a head nor a state, or if a time is not a number.
+    Raises FormatError if the file has neither a header nor a state, or if a time is not a number.
     """
 
     format, digits = "matsum", 5
@@ -132,7 +132,7 @@ class Matsum(Blocks):
         Raises
         ------
         FormatError
-            If the file does not have the quantity or a part, or not exactly once in every state.
+            If the quantity or a part does not occur exactly once in every state.
         """
         if quantity not in QUANTITIES:
             raise FormatError(
@@ -284,7 +284,8 @@ def _describe_matsum_block(
 def _find_part_number(legend: Mapping[int, str], text: bytes, block: bytes) -> int:
     """Read the part number at the beginning of ``text``.
 
-    A single overflowed number is the only number of the legend that is too wide; several could not be told apart.
+    If a number overflowed its field, it is the only number in the legend that is too wide; several such numbers could
+    not be distinguished.
     """
     if match := _ID.match(text):
         return int(match[1])

@@ -22,8 +22,8 @@ def read_plain_rows(
 ) -> Samples | None:
     """Read the columns ``used`` of complete lines, shape (rows, len(used)).
 
-    Return None unless each line is a row with all its cells. ``is_large`` states that the piece belongs to a large
-    text, for which importing pandas pays.
+    Return None unless each line is a row with all its cells. ``is_large`` is True if the lines belong to a large text,
+    for which the time to import pandas is worthwhile.
     """
     if layout.thousands:
         return None
@@ -126,8 +126,8 @@ def _read_with_pandas(
 def read_exact_numbers(piece: bytes, separator: str, fast: Samples) -> Samples | None:
     """Parse rows of numbers exactly with scipy; None if scipy fails or contradicts the fast result ``fast``.
 
-    Scipy reads them as a matrix file with one number a line. It ignores what follows a number in its line, so its
-    result is compared with ``fast``, shape (rows, columns), which are the numbers to some nine digits.
+    Scipy reads them as a matrix file with one number per line. It ignores text after a number in the same line, so its
+    result is compared with ``fast`` (rows, columns), which contains the numbers with about nine digits.
     """
     from io import BytesIO
 

@@ -1,9 +1,10 @@
 """Read the records of Radioss time histories from binary files and from the text files of ``/TFILE/3``.
 
-A binary record is its length, its bytes and its length again, all big-endian. A record of text begins with a line
-``ZZZZZEOR`` that gives its numbers of integers (I), characters (C) and reals (R); lines of fixed columns follow: ten
-columns for an integer, 16 to a line; 16 for a real, five to a line. Records of the head are returned in binary form
-for both containers. Records of states are only described, since their numbers are read column by column.
+A binary record consists of its length, its bytes and its length again, all big-endian. A text record begins with a line
+``ZZZZZEOR`` that contains the numbers of its integers (I), characters (C) and reals (R). Lines of fixed columns follow:
+an integer has ten columns, with 16 integers per line, and a real has 16 columns, with five reals per line. Records of
+the header are returned in binary form for both types of files. Only the layout of state records is returned, because
+their numbers are read column by column.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """Read time histories of Radioss and OpenRadioss (T01, T02, ..., one per engine run), binary or text.
 
-The head names the run, gives the numbers of parts, materials, properties, subsets, groups and global variables, and
-describes each of them. Each state is a record with the time, and one record each for the global variables, the parts,
-the subsets and every group that there is. All states have the same lengths, so a column is a strided view of the
-file. The layout of a record is in `radioss_records`.
+The header contains the name of the run, the numbers of parts, materials, properties, subsets, groups and global
+variables, and a description of each of them. Each state consists of a record with the time, and one record each for the
+global variables, the parts, the subsets and every group. The records have the same lengths in all states, so a column
+is a strided view of the file. The layout of a record is described in `radioss_records`.
 """
 
 from __future__ import annotations
@@ -74,7 +74,8 @@ _IMPULSES: Final = ((1, 2, 3), (4, 5, 6))
 class _Group(NamedTuple):
     """A group that has a history: its type, its number of members, and the codes of its variables.
 
-    ``named`` are number and title of each member; empty for a group of neither nodes, interfaces nor rigid walls.
+    ``named`` contains the id and title of each member; it is empty unless the group consists of nodes, interfaces or
+    rigid walls.
     """
 
     kind: int
@@ -115,8 +116,8 @@ def recognises(head: bytes) -> bool:
 def open_legs(sources: Sequence[Source], _: Selection) -> list[TimeHistory]:
     """Open each file as a restart segment of the run.
 
-    A time history with its own output interval (T01a, by /ATFILE) has no global values and is no leg next to other
-    files.
+    A time history with its own output interval (T01a, by /ATFILE) has no global values, and is not a restart segment if
+    there are other files.
     """
     histories = [TimeHistory(source.data, source.name) for source in sources]
     legs = [history for history in histories if history.channels] or histories
@@ -135,14 +136,15 @@ class TimeHistory(Database):
     Parameters
     ----------
     content : bytes or Content
-        The whole file.
+        Content of the file.
     source : str
         Name of the file, for messages.
 
     Raises
     ------
     FormatError
-        If the head is not complete, a record has not the length in the head, or the text is coded.
+        If the header is incomplete, if a record does not have the length stated in the header, or if the text is
+        encoded.
     """
 
     format = "radioss-th"
@@ -251,7 +253,7 @@ class TimeHistory(Database):
         Raises
         ------
         FormatError
-            If a part is not in the file, or has not this variable.
+            If the file does not contain a part, or a part does not have this variable.
         """
         record = 1 + bool(self.channels)
         return self._columns(record, [self._place(id_, quantity) for id_ in ids])
@@ -290,7 +292,8 @@ class TimeHistory(Database):
     def _whole_states(self) -> tuple[int, tuple[str, ...]]:
         """Count the complete states; only the last state may be truncated.
 
-        Records have neither name nor number: if one is lost or inserted, no state of the file can be trusted.
+        Records have neither a name nor a number, so if a record is lost or inserted, no state of the file can be
+        trusted.
         """
         states, bytes_left = divmod(len(self._data) - self._records.at, self._stride)
         marks = []

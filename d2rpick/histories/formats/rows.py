@@ -33,13 +33,13 @@ def read_columns(
 ) -> ReadColumns:
     """Read the columns ``used`` of the rows from byte ``begin`` on; the first of these columns is the time.
 
-    Between the rows there may be comments and blank lines; below them words (such as a total) and the same table
-    again. A row whose used cells are all empty ends the curve, while a longer curve next to it may go on.
+    There may be comments and blank lines between the rows, and below them words (such as a total) and the same table
+    again. A row whose used cells are all empty ends the curve, although a longer curve beside it may continue.
 
     Raises
     ------
     FormatError
-        With the line that is wrong.
+        If a line is wrong; the message names the line.
     """
     curve = _Curve(text.name, layout, used)
     tables = [table for _, table in _read_tables(text, begin, curve)] or [

@@ -93,7 +93,7 @@ class Text:
     def pieces(self, begin: int, *, large: bool = False) -> Iterator[bytes]:
         """Yield the complete lines after byte ``begin``, in blocks of many lines; ``large`` selects larger blocks.
 
-        Raises FormatError after the last piece if the file was rewritten meanwhile.
+        Raises FormatError after the last block if the file was rewritten in the meantime.
         """
         size = self.large if large else self.piece
         while begin < self._end:
@@ -201,18 +201,18 @@ def find_precisions(
 ) -> tuple[Precision, Precision]:
     """Return the precision with which times and energies were printed, from a sample of their fields.
 
-    A program writes all columns in one format: the most significant digits of any field hold for both columns, since
-    formats like ``%g`` drop trailing zeros; 15 or more mean that nothing was lost. A column without exponents whose
-    fields all have the same number of decimals is treated as printed in fixed decimals. Times on an exactly uniform
-    grid with more decimals than the grid needs are exact multiples of a time step and get the digits of the energy;
-    if no decimal is to spare, they may have been rounded to the grid.
+    A program is assumed to write all columns in the same format, so the largest number of significant digits in any
+    field applies to both columns (formats like ``%g`` omit trailing zeros); 15 or more digits mean that nothing was
+    lost. A column without exponents whose fields all have the same number of decimals is assumed to have fixed
+    decimals. Times on an exactly uniform grid with more decimals than the grid needs are exact multiples of a time step
+    and get the digits of the energy; otherwise, they may have been rounded to the grid.
 
     Parameters
     ----------
     time, energy : sequences of str
         Fields with a decimal point, at least one each.
     moments : array of shape (n,)
-        The times as numbers, of the whole record [unit of the run].
+        The times of the whole record as numbers [time].
 
     Examples
     --------
@@ -240,11 +240,11 @@ def find_precisions(
 def is_whole_field(field: str, above: Sequence[str]) -> bool:
     """Return True if the last field of a truncated file is complete, judging by the fields above it.
 
-    The field is complete if the column has a format of constant length: always the same number of decimals (two or
-    more) and of digits in the exponent, with a trailing zero somewhere, which shortest formats (``%g``) never write. An
-    exponent that could be the start of a longer one (``e-10`` of ``e-100``) remains in doubt. It is also complete if
-    it has the 17 digits that restore every double, no field above has more, and no exponent can follow: an exponent
-    follows only a mantissa with one digit before the point.
+    The field is complete if the column has a format of constant length, i.e. always the same number of decimals (two or
+    more) and of digits in the exponent, and at least one trailing zero, which shortest formats (``%g``) never write. An
+    exponent that could be the beginning of a longer one (``e-10`` of ``e-100``) is not treated as complete. The field
+    is also complete if it has the 17 digits that restore every double, no field above has more digits, and no exponent
+    can follow, because an exponent follows only a mantissa with one digit before the point.
 
     Examples
     --------

@@ -1,0 +1,280 @@
+"""Write the findings of ``check`` as a table, with the texts that its other output formats share.
+
+This module is apart from the other formats, because a small deck is checked in the time that their imports take.
+"""
+
+from __future__ import annotations
+
+import os
+from collections import Counter
+from typing import TYPE_CHECKING, Final
+
+from d2rpick.base.errors import make_printable, name_units
+from d2rpick.base.files import STDIN
+from d2rpick.choice.pair.grades import POOR
+from d2rpick.deck.beside import find_history_beside
+from d2rpick.report import tables
+from d2rpick.rules.base import Severity, group_values
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+    from typing import Any, ClassVar, Protocol
+
+    from d2rpick.base.errors import Caution
+    from d2rpick.report.formats import DisplayOptions
+    from d2rpick.rules import Checked, CheckedWindow
+    from d2rpick.rules.base import Finding, Unreadable
+
+    class Checks(Protocol):
+        """What the output formats show of the findings in several decks."""
+
+        # Mark of a dataclass, of which `dataclasses.replace` makes changed copies.
+        __dataclass_fields__: ClassVar[dict[str, Any]]
+
+        @property
+        def results(self) -> Sequence[Checked]:
+            """Results of the decks that could be read."""
+
+        @property
+        def root(self) -> str:
+            """Folder below which paths are shown relative to it."""
+
+        @property
+        def failed(self) -> Sequence[Unreadable]:
+            """Decks that could not be read."""
+
+        @property
+        def cautions(self) -> Sequence[Caution]:
+            """Warnings about the input."""
+
+        @property
+        def history(self) -> Sequence[str] | None:
+            """Files from which the windows were judged; None if there are none."""
+
+        @property
+        def fail_on(self) -> Severity:
+            """Least severe finding that counts as a failure."""
+
+        @property
+        def history_has_parts(self) -> bool:
+            """True if the windows were judged by the energies of their parts."""
+
+
+# Nouns for the severities error, warning and info.
+_NOUNS: Final = ("error", "warning", "info message")
+# Name of the switched run in a command if the user has to give it.
+_SOME_RUN: Final = "SWITCHED_RUN"
+# Name of the history in a command if the user has to give it.
+_SOME_HISTORY: Final = "HISTORY"
+# Rule that reports switches without a time, and the end of its message if nothing else gives their time.
+_UNTIMED_RULE: Final = "D2R302"
+_NOT_JUDGED: Final = "not judged by time"
+
+
+def as_table(checks: Checks, display: DisplayOptions) -> str:
+    """Return one line per finding and per window of each deck, the numbers of findings and decks, and the next step.
+
+    Below a plan with which the deck was written, the plan gives the next step.
+    """
+    lines: list[str] = []
+    for result in checks.results:
+        lines.append(format_path(result.deck, checks.root))
+        if _switches_at_unknown_times(result):
+            lines.append(
+                "  switches itself by forces or sensors of the run; its times are not judged"
+            )
+        elif not result.cards and not result.windows:
+            lines.append("  no switching cards")
+        elif not result.windows and not result.findings:
+            lines.append("  switching cards that switch nothing")
+        lines += [f"  {line}" for line in _format_windows(result.windows, checks.root)]
+        lines += [
+            f"  {format_finding(finding)}" for finding in list_findings(checks, result)
+        ]
+    step = [] if display.written_deck else [f"next  {_name_next_step(checks)}"]
+    return "\n".join(
+        [*map(make_printable, lines), "", *step, summarize_findings(checks)]
+    )
+
+
+def _switches_at_unknown_times(result: Checked) -> bool:
+    """Return True if the switching times of a deck depend on the solution and no history shows them."""
+    return result.switches_itself and not result.windows
+
+
+def _has_only_untimed_cards(result: Checked) -> bool:
+    """Return True if no switching card of a deck has a time that can be compared with an energy history."""
+    untimed = {
+        (finding.file, finding.line)
+        for finding in result.findings
+        if finding.rule == _UNTIMED_RULE and finding.message.endswith(_NOT_JUDGED)
+    }
+    return len(untimed) >= result.cards
+
+
+def _name_next_step(checks: Checks) -> str:
+    """Return what to do after the check, with a command that can be copied."""
+    serious = [
+        finding
+        for result in checks.results
+        for finding in list_findings(checks, result)
+        if finding.severity is not Severity.INFO
+    ]
+    if serious:
+        worst = min(serious, key=lambda finding: finding.severity.rank)
+        explain = tables.quote_shell_line(("d2rpick", "rule", worst.rule))
+        return (
+            f"correct what the lines above report; {explain} explains the worst of them"
+        )
+    decks = tables.make_positional([result.deck for result in checks.results])
+    itself = next(filter(_switches_at_unknown_times, checks.results), None)
+    if itself:
+        folder = tables.make_positional([os.path.dirname(itself.deck) or os.curdir])  # noqa: PTH120  a name with a NUL byte has no folder
+        follow = tables.quote_shell_line(("d2rpick", "follow", *folder))
+        return (
+            f"run the deck; {follow} shows meanwhile when the parts fly and are rigid"
+        )
+    if not any(result.cards for result in checks.results):
+        found, hint = _name_history(checks)
+        plan = tables.quote_shell_line(("d2rpick", "plan", *found))
+        return f"if the run is to be switched, choose the times with {plan}{hint}, and add the cards to the deck"
+    if all(map(_has_only_untimed_cards, checks.results)):
+        explain = tables.quote_shell_line(("d2rpick", "rule", _UNTIMED_RULE))
+        return f"no card has a time that a history can judge; {explain} says how to have such switches judged"
+    if checks.history is None:
+        # The history next to a deck that switches may be that of the switched run.
+        command = tables.quote_shell_line(("d2rpick", "check", *decks))
+        hint = f"(history of the reference run instead of {_SOME_HISTORY})"
+        return f"judge the times by the reference run: {command} --history {_SOME_HISTORY} {hint}"
+    history = tables.make_positional(checks.history)
+    grades = [
+        window.decision.grade
+        for result in checks.results
+        for window in result.windows
+        if window.decision
+    ]
+    if POOR in grades:
+        plan = tables.quote_shell_line(("d2rpick", "plan", *history))
+        return f"choose other times with {plan}"
+    folders = {os.path.dirname(result.deck) for result in checks.results}  # noqa: PTH120  a name with a NUL byte has no folder
+    of_history = {os.path.dirname(file) for file in checks.history}  # noqa: PTH120  a name with a NUL byte has no folder
+    # The switched run is expected in the folder of the deck, unless this folder already contains the reference run.
+    runs = [] if folders & of_history else [folder or os.curdir for folder in folders]
+    switched = tables.make_positional(runs[:1] or [_SOME_RUN])
+    hint = "" if runs else f" (folder of the switched run instead of {_SOME_RUN})"
+    parts = _name_judged_parts(checks)
+    line = tables.quote_shell_line(
+        ("d2rpick", "verify", "--switched", *switched, *parts, *history)
+    )
+    return f"run the deck, and compare the run with {line}{hint}"
+
+
+def _name_history(checks: Checks) -> tuple[tuple[str, ...], str]:
+    """Return the history next to the only deck or, if there is none, a placeholder, and a hint to replace it."""
+    decks = [result.deck for result in checks.results]
+    history = find_history_beside(decks[0]) if len(decks) == 1 else None
+    if history:
+        return tables.make_positional([history]), ""
+    hint = f" (history of the reference run instead of {_SOME_HISTORY})"
+    return (_SOME_HISTORY,), hint
+
+
+def _name_judged_parts(checks: Checks) -> tuple[str, ...]:
+    """Return the option that names the parts of the judged windows; empty if the whole model was judged."""
+    parts = {
+        window.part
+        for result in checks.results
+        for window in result.windows
+        if window.decision and window.part is not None
+    }
+    if not checks.history_has_parts or not parts:
+        return ()
+    return ("--part", ",".join(map(str, sorted(parts))))
+
+
+def _format_windows(windows: Sequence[CheckedWindow], root: str) -> Iterator[str]:
+    """Return a line per window, with its verdict, reason and cure if it was judged."""
+    for group in group_alike(windows):
+        first = group[0]
+        location = f"{format_path(first.place.file, root)}:{first.place.line}"
+        yield f"{describe_windows(group)} ({location})"
+        if decision := first.decision:
+            yield f"  why         {decision.reason}"
+            if decision.cure:
+                yield f"  to improve  {decision.cure}"
+
+
+def group_alike(windows: Sequence[CheckedWindow]) -> Iterator[list[CheckedWindow]]:
+    """Yield the windows in groups with the same cards, times and verdict."""
+    alike = (
+        (
+            (window.cards, window.unit.kind, window.tr, window.td, window.decision),
+            window,
+        )
+        for window in windows
+    )
+    yield from group_values(alike).values()
+
+
+def describe_windows(group: Sequence[CheckedWindow]) -> str:
+    """Describe similar windows: their verdict if they were judged, their parts and their times."""
+    first = group[0]
+    until = "the end" if first.td is None else f"{first.td:g}"
+    names = name_units((window.unit.id for window in group), first.unit.kind)
+    verdict = f"{first.decision.verdict}: " if first.decision else ""
+    return f"{verdict}{names}: rigid from {first.tr:g} to {until}"
+
+
+def list_findings(checks: Checks, *results: Checked) -> Iterator[Finding]:
+    """Return the findings in all decks, or in given ``results``, with paths for display."""
+    for finding in (
+        finding for result in results or checks.results for finding in result.findings
+    ):
+        yield finding._replace(
+            file=format_path(finding.file, checks.root),
+            deck=format_path(finding.deck, checks.root),
+        )
+
+
+def format_finding(finding: Finding) -> str:
+    """Return the location, severity, rule and message of a finding in one line."""
+    return f"{format_location(finding)}: {finding.severity} {finding.rule} {finding.message}"
+
+
+def format_location(finding: Finding) -> str:
+    """Return file, line and column of a finding."""
+    return f"{finding.file}:{finding.line}:{finding.column}"
+
+
+def count_severities(results: Sequence[Checked]) -> dict[str, int]:
+    """Return the number of findings of each severity, by its plural, as in the JSON output."""
+    counted = Counter(
+        finding.severity for result in results for finding in result.findings
+    )
+    return {f"{severity}s": counted[severity] for severity in Severity}
+
+
+def summarize_findings(checks: Checks) -> str:
+    """Return the numbers of findings and decks, and the input that was not judged, as a sentence."""
+    results = checks.results
+    counted = [
+        f"{count} {noun}{'s' * (count != 1)}"
+        for noun, count in zip(_NOUNS, count_severities(results).values(), strict=True)
+    ]
+    decks = "1 deck" if len(results) == 1 else f"{len(results)} decks"
+    left_out = f", {len(checks.failed)} not checked" if checks.failed else ""
+    unjudged = checks.history is None and any(result.windows for result in results)
+    return f"{', '.join(counted)} in {decks}{left_out}{'; times not judged: no `history`' * unjudged}"
+
+
+def format_path(path: str, root: str) -> str:
+    """Return a path for display, with ``/`` and no undecodable bytes; a path inside ``root`` becomes relative to it."""
+    if path == STDIN:
+        return path
+    absolute = os.path.abspath(os.path.join(root, path))  # noqa: PTH100, PTH118  pathlib would slow start-up
+    displayed = (
+        os.path.relpath(absolute, root)
+        if absolute.startswith(os.path.join(root, ""))  # noqa: PTH118  pathlib would slow start-up
+        else absolute
+    )
+    return os.fsencode(displayed).decode("utf-8", "replace").replace(os.sep, "/")
