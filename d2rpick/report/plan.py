@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 from d2rpick.base.errors import list_names, make_printable
 from d2rpick.choice.pair.grades import DO_NOT_USE, GOOD, USE, USE_WITH_CARE
 from d2rpick.choice.td.plan import TOO_SHORT
+from d2rpick.flight.flight import NEVER_FLIES, denies_every_flight
 from d2rpick.report import keys, tables
 from d2rpick.report.decision import (
     format_in_full,
@@ -42,6 +43,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.pair.decision import Decision
     from d2rpick.choice.pair.situation import Situation
     from d2rpick.choice.td.plan import PlannedFlight, RunPlan
+    from d2rpick.histories.history import History
     from d2rpick.report.formats import DisplayOptions, RepeatedQuestion, WrittenDeck
 
 
@@ -423,9 +425,7 @@ def _list_step_without_window(
         if plan.done:
             return []
         if not plan.flights:
-            line = write_command(question, "info")
-            look = f"see with {line} what the run has to write"
-            return [("next", f"{look}, or give the end of the load as --after")]
+            return [("next", _name_step_without_flight(plan.history, question))]
         return [("next", _name_step_if_flights_are_short(question))]
     answer = max(rows, key=lambda row: row.end - row.start).answer
     assert answer is not None
@@ -435,6 +435,18 @@ def _list_step_without_window(
         answer.situation, better, question, otherwise, answer.decision
     )
     return [("next", step)]
+
+
+def _name_step_without_flight(history: History, question: RepeatedQuestion) -> str:
+    """Return the step if no flight is found; the end of the load is asked for unless the momentum shows no flight."""
+    line = write_command(question, "info")
+    look = f"see with {line} what the run has to write"
+    if not denies_every_flight(history):
+        return f"{look}, or give the end of the load as --after"
+    no_pair = f"{name_lack_of_pairs(question)}: {NEVER_FLIES}"
+    if any(momenta.parts for momenta in history.momenta):
+        return f"{no_pair}; run it without switching"
+    return f"{no_pair}; {look} to show whether single parts fly"
 
 
 def _name_step_if_flights_are_short(question: RepeatedQuestion) -> str:

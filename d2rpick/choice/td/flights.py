@@ -7,7 +7,13 @@ from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import RangeError
 from d2rpick.choice.parts.margins import find_margin
-from d2rpick.flight.flight import Flight, find_all_seen, list_witnesses
+from d2rpick.flight.flight import (
+    NEVER_FLIES,
+    Flight,
+    denies_every_flight,
+    find_all_seen,
+    list_witnesses,
+)
 from d2rpick.flight.window import list_moments
 from d2rpick.histories.digits import round_down_as_read, sum_times_as_read
 
@@ -57,6 +63,9 @@ def find_longest_flight(
             cure = "name parts that nothing holds"
         elif settings.after is not None:
             cure = "give `td`"
+        elif denies_every_flight(history):
+            reason = f"{reason}: {NEVER_FLIES}"
+            cure = "run it without switching, or write the momenta of the parts and choose those that fly"
         else:
             cure = "if you know the end of the load, give it as `after`"
         raise RangeError(f"{', '.join(history.source)}: {reason}; {cure}")
