@@ -134,6 +134,8 @@ class Overview(NamedTuple):
         if not self.flights and self.states is not None and self.states < _FEWEST:
             states = f"{self.states} state{'s' * (self.states != 1)}"
             return f"the files contain {states}, at least {_FEWEST} were expected"
+        if not self.flights and not self.complete:
+            return "the files end within a state, and no free flight is found in the part that was read"
         if not self.flights:
             return "no free flight is found, so nothing can be made rigid"
         if self._is_spent:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Final
 
-from d2rpick.base.errors import list_names, make_printable
+from d2rpick.base.errors import COPY_AGAIN, list_names, make_printable
 from d2rpick.choice.pair.grades import DO_NOT_USE, USE, USE_WITH_CARE
 from d2rpick.flight import SOURCES
 from d2rpick.flight.flight import NEVER_FLIES
@@ -157,6 +157,8 @@ def list_overview_lines(overview: Overview) -> list[tuple[str, str]]:
             return lines
         if overview.is_loaded:
             return [*lines, ("to improve", _EXPLAIN_LOAD)]
+        if not overview.complete:
+            return [*lines, ("to improve", COPY_AGAIN)]
         missing = overview.should_write
         without_output = (
             _RUN_WITHOUT_SWITCHING if overview.never_flies else _GIVE_END_OF_LOAD

@@ -13,6 +13,7 @@ from d2rpick.report import keys, tables
 from d2rpick.report.decision import (
     format_in_full,
     format_outlook,
+    format_rigid_share,
     format_saved_share,
 )
 from d2rpick.report.fields import (
@@ -26,6 +27,7 @@ from d2rpick.report.fields import (
     write_csv,
 )
 from d2rpick.report.next_step import (
+    add_step_to_copy,
     name_lack_of_pairs,
     name_step_after_refusal,
     name_step_to_card,
@@ -281,7 +283,7 @@ def give_plan_sentence(plan: RunPlan) -> str:
         "from {:.6g} to {:.6g}".format(*window) for window in plan.windows
     )
     use = _describe_use(plan)
-    share = f"{plan.rigid_fraction:.0%} of the simulated time"
+    share = format_rigid_share(plan.rigid_fraction, plan.history)
     if _uses_only_poor_windows(plan):
         return f"{use}: rigid {spans}, {share}, is planned only because of `min_quality` poor"
     text = f"{use}: make rigid {spans}, {share}"
@@ -380,8 +382,17 @@ def list_next_steps(
 ) -> list[tuple[str, str]]:
     """Return the next commands for the windows that can be used now, as (name, command) pairs.
 
-    If the deck has already been written with the cards, the next step is to run it.
+    If the deck has already been written with the cards, the next step is to run it. If the files are cut, the first
+    step is to copy them again.
     """
+    steps = _list_steps_for_record(plan, question, written_deck)
+    return add_step_to_copy(plan.history, steps)
+
+
+def _list_steps_for_record(
+    plan: RunPlan, question: RepeatedQuestion, written_deck: WrittenDeck | None
+) -> list[tuple[str, str]]:
+    """Return the next commands for the part of the run that was read."""
     if not plan.windows or _uses_only_poor_windows(plan):
         return _list_step_without_window(plan, question)
     waiting = any(row.status == "re-plan" for row in plan.flights)
@@ -423,6 +434,8 @@ def _list_step_without_window(
     rows = [row for row in plan.flights if row.answer and not row.done]
     if not rows:
         if plan.done:
+            return []
+        if not plan.flights and not plan.history.complete:
             return []
         if not plan.flights:
             return [("next", _name_step_without_flight(plan.history, question))]
