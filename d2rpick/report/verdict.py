@@ -130,7 +130,9 @@ def list_next_step(
             decision,
         )
     elif answer.switched and display.page:
-        step = f"{_name_usable_results(decision)}; {display.page} contains the comparison"
+        step = (
+            f"{_name_usable_results(decision)}; {display.page} contains the comparison"
+        )
     elif answer.switched:
         words = (*question.times, "--report", "verify.html")
         line = write_command(question, "verify", *words)
