@@ -25,6 +25,7 @@ from d2rpick.report.situation import list_situation_heading
 
 if TYPE_CHECKING:
     from d2rpick.choice.answers import PairVerdict
+    from d2rpick.choice.pair.decision import Decision
     from d2rpick.choice.switched.comparison import Comparison
     from d2rpick.report.formats import DisplayOptions
 
@@ -129,15 +130,23 @@ def list_next_step(
             decision,
         )
     elif answer.switched and display.page:
-        step = f"use the results of the switched run; {display.page} contains the comparison"
+        step = (
+            f"{_name_usable_results(decision)}; {display.page} contains the comparison"
+        )
     elif answer.switched:
         words = (*question.times, "--report", "verify.html")
         line = write_command(question, "verify", *words)
-        step = f"use the results of the switched run; keep the comparison with {line}"
+        step = f"{_name_usable_results(decision)}; keep the comparison with {line}"
     else:
         pair = (answer.candidate.tr, answer.td)
         step = name_step_with_pair(situation, pair, decision.better, question, "card")
     return [("next", step)]
+
+
+def _name_usable_results(decision: Decision) -> str:
+    """Return the advice to use the switched run, with the restriction that the reason for the verdict also names."""
+    usable = "only the motion" if decision.allows_only_motion else "the results"
+    return f"use {usable} of the switched run"
 
 
 def list_comparison_verdict(switched: Comparison) -> tuple[str, str]:

@@ -160,6 +160,32 @@ def test_after_the_comparison_with_a_switched_run_none_is_asked_for() -> None:
     assert cures == {"write more often"}
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("form", ["table", "page"])
+def test_the_step_after_a_comparison_keeps_the_restriction_to_the_motion(
+    tmp_path: Path, form: str
+) -> None:
+    """If the reason for the verdict says that only the motion can be used, so does the next step."""
+    switched, page = str(tmp_path / "switched.matsum"), str(tmp_path / "page.html")
+    times = ("--tr", "0.123689", "--td", "0.37")
+    run("rollover", *times, "--with-step", "--dt", "1e-3", "-o", switched)
+    report = ("--report", page) if form == "page" else ()
+    parts = ("--deck", DECK, "--part", "recommended")
+    text = run("verify", *parts, "--switched", switched, *report, MATSUM).stdout
+    sentences = join_wrapped_lines(text)
+    assert "limit for use with care: 5%): use only the motion " in sentences
+    step = "use only the motion of the switched run; "
+    assert f"next {step}" in sentences
+    assert not report or step in Path(page).read_text("utf-8")
+
+
+def test_the_step_after_a_comparison_of_a_good_pair_has_no_restriction() -> None:
+    folder = str(SAMPLES / "oscillator_switched")
+    verify = ("verify", "--part", "bar", "--switched", folder)
+    text = find_line("next", *verify, str(SAMPLES / "oscillator" / "OSCT01.gz"))
+    assert text.startswith("use the results of the switched run; ")
+
+
 WITH_CARE = ("--tr", "0.123689", "--td", "0.37", "--part", "flying")
 DO_NOT_USE = ("--tr", "0.09", "--td", "0.37", "--part", "flying")
 FLYING = ("--part", "flying", MATSUM)

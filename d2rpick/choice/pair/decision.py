@@ -132,6 +132,11 @@ class Decision(NamedTuple):
             cause.cure == CHOOSE_TIMES_IN_FLIGHT for cause in self.quality.motion.causes
         )
 
+    @property
+    def allows_only_motion(self) -> bool:
+        """True if the pair can be used, but only because its wrong vibration hardly affects the next contact."""
+        return self.grade != POOR and self.quality.alone.grade == POOR
+
     def reaches(self, grade: str) -> bool:
         """Return True if the pair has at least the given grade."""
         return GRADES.index(self.grade) >= GRADES.index(grade)
