@@ -385,9 +385,10 @@ class Profile(NamedTuple):
     ) -> Samples:
         """Return the time from each ``tr`` to the point at which linear interpolation reaches an error of ``limit``."""
         inside = np.clip(outside + inwards, 0, self.time.size - 1)
-        t0, e0 = self.time[inside], self.error[inside]
+        # If there is no sample between tr and the first sample outside, tr itself is the point inside.
+        is_beyond_tr = (self.time[inside] - tr) * inwards > 0
+        t0 = np.where(is_beyond_tr, tr, self.time[inside])
+        e0 = np.where(is_beyond_tr, limit - TOLERATED_GROWTH, self.error[inside])
         t1, e1 = self.time[outside], self.error[outside]
         share = np.divide(limit - e0, e1 - e0, out=np.zeros(tr.shape), where=e1 != e0)
-        # If there is no sample between tr and the first sample outside, this first sample is used.
-        leaving_time = np.where(e0 > limit, t1, t0 + share * (t1 - t0))
-        return np.asarray(np.abs(leaving_time - tr))
+        return np.asarray(np.abs(t0 + share * (t1 - t0) - tr))

@@ -198,6 +198,11 @@ class ModalVibration:
         """Return True if the modes predict the record much more accurately than required."""
         return self._predicts_within(_EXACT)
 
+    @property
+    def explains_all(self) -> bool:
+        """Return True if what the modes leave of the record is hardly anything, or white noise."""
+        return self.is_exact or (self.signed and self._structure_of_rest == 0)
+
     def _predicts_within(self, share: float) -> bool:
         """Return True if the modes' error, apart from white noise, is below ``share`` of the acceptable error."""
         doubts = self.doubts

@@ -13,8 +13,6 @@ from d2rpick.vibration.modal import ModalVibration, identify_modal
 from d2rpick.vibration.span import ERRORS_OFF, MOST_REFITS, Span
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from d2rpick.histories.history import History, Samples
 
 # Number of equal parts of the record; windows end at the boundaries of the parts.
@@ -38,7 +36,11 @@ class ModalWindow(NamedTuple):
 def find_described(
     history: History, td: float, guess: Span | None
 ) -> ModalWindow | None:
-    """Find a window around td in which modes continue undisturbed; None if there is none.
+    """Find the longest window around td in which modes continue undisturbed; None if there is none.
+
+    Of several windows, the longest one whose modes explain all but noise is used: if a window begins in a load, its
+    modes may seem good, but those of a later window explain more.  Noise shortens the guessed window, and by another
+    amount at each td.
 
     Parameters
     ----------
@@ -50,12 +52,20 @@ def find_described(
     """
     windows = _list_windows(history, td, guess)
     grown = (_grow_described(history, window) for window in windows)
-    first = next((described for described in grown if described is not None), None)
-    if first is None or first.vibration.is_exact:
-        return first
-    # If the window begins in a load, its modes may seem good, but those of the next window are exact.
-    second = next(grown, None)
-    return second if second is not None and second.vibration.is_exact else first
+    best: ModalWindow | None = None
+    for described in filter(None, grown):
+        if best is None or _rate_window(described) > _rate_window(best):
+            best = described
+        vibration = best.vibration
+        if vibration.explains_all and not vibration.is_vague:
+            break  # The windows that follow are shorter.
+    return best
+
+
+def _rate_window(described: ModalWindow) -> tuple[bool, bool, float]:
+    """Return a sort key of a window; the largest key is that of the best window."""
+    vibration, span = described
+    return not vibration.is_vague, vibration.explains_all, span.end - span.start
 
 
 @remember
@@ -83,18 +93,17 @@ def get_inner_window(history: History, guess: Span) -> Span:
     return Span(float(start), float(end))
 
 
-def _list_windows(history: History, td: float, guess: Span | None) -> Iterator[Span]:
-    """Yield trial windows: first the guessed window, then later windows that extend to the end of the record."""
-    if guess is not None:
-        inner = get_inner_window(history, guess)
-        if inner.start < td <= inner.end:
-            yield inner
+def _list_windows(history: History, td: float, guess: Span | None) -> list[Span]:
+    """Return trial windows around td, the longest first: the guessed one, and those that extend to the record's end."""
     first = history.start
     last = history.end
-    for share in _BEGINNINGS:
-        beginning = first + share * (last - first)
-        if beginning < td:
-            yield Span(beginning, last)
+    windows = [Span(first + share * (last - first), last) for share in _BEGINNINGS]
+    if guess is not None:
+        windows.append(get_inner_window(history, guess))
+    return sorted(
+        (window for window in windows if window.start < td <= window.end),
+        key=lambda window: window.start - window.end,
+    )
 
 
 def identify_window(history: History, window: Span) -> ModalVibration | None:

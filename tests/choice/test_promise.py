@@ -67,6 +67,14 @@ def test_what_was_upside_down_has_the_sign_of_td(
         # A pair that is hardly longer, but exceeds the limit of a good pair.
         pytest.param("irregular", 6, 0, marks=pytest.mark.slow),
         pytest.param("3 to 5 modes, noise", 6, 3, marks=pytest.mark.slow),
+        # Noise hides from the late td where the flight begins.
+        pytest.param("exchange, 1 % noise", 505, 0, marks=pytest.mark.slow),
+        # Nothing is known at the first td, which lies in a window that begins in the load.
+        ("coarse output", 5, 1),
+        # The quick search finds no oscillator at any td, but the full search finds one.
+        ("Duffing and plastic", 808, 1),
+        # The residual grows fast on both sides of tr, which lies between two evaluated times.
+        pytest.param("stiffness damping, 2 % noise", 909, 0, marks=pytest.mark.slow),
     ],
 )
 def test_a_good_pair_that_exists_is_found_and_called_good(
@@ -76,6 +84,16 @@ def test_a_good_pair_that_exists_is_found_and_called_good(
     pair = require(ask_for_pair(record, tmp_path))
     assert pair.grade == "good"
     assert pair.true < DESERVES_GOOD
+    assert pair.kept
+
+
+def test_a_pair_at_the_level_does_not_replace_one_with_a_residual(
+    tmp_path: Path,
+) -> None:
+    """Swings show the direction only after the first part of this flight, where the level error is close to 0."""
+    record = CLASSES["rattle"](np.random.default_rng([505, 0]))
+    pair = require(ask_for_pair(record, tmp_path))
+    assert pair.basis == "swings"
     assert pair.kept
 
 

@@ -462,9 +462,10 @@ def test_a_plan_explains_a_window_whose_vibration_error_is_only_small_beside_the
     assert "error" in header.split()
     words = " ".join(screen.split())
     assert "residual 0.607 use next run" in words
-    reason = "use: the vibration after td is wrong by 61%, but the energy of this error is at most 0.43% of the energy"
-    limit = "of the next contact (limit for use: 1%): use only the motion. Expect: mean energy after td 97% to 98%"
-    assert f"flight 1 {reason} {limit}" in words
+    reason = "the vibration after td is wrong by 61%, but the energy of this error is at most 0.43% of the energy"
+    limit = "of the next contact (limit for use: 1%): use only the motion"
+    assert f"why flight 1: {reason} {limit}" in words
+    assert "flight 1 Expect: mean energy after td 97% to 98%" in words
     assert "judged internal_energy, not that of chosen parts (--part)" in words
     assert "limit for use: 1%" in run("plan", "-f", "markdown", BOX).stdout
     assert "limit for use: 1%" in run("plan", "-f", "csv", BOX).stdout

@@ -64,6 +64,17 @@ def test_static_energy_that_stays_is_no_beat(static: float) -> None:
     assert identify_in_noise(structure, static=static).with_close_modes is None
 
 
+@pytest.mark.parametrize(("least", "rise"), [(0.5, 0.04), (3.0, 0.05)])
+def test_static_energy_that_hardly_rises_while_a_line_decays_is_no_beat(
+    least: float, rise: float
+) -> None:
+    """Both are relative to the energy of the lines at the start of the record."""
+    structure = make_close(0.0, 0.0, damping=0.02)
+    level = np.sum(structure.amplitude**2) / 2
+    heat = level * (least + rise * TIME / TIME[-1])
+    assert identify_in_noise(structure, 0.01, static=heat).with_close_modes is None
+
+
 def test_lines_without_noise_tell_close_modes_by_themselves() -> None:
     modal = identify_in_noise(make_close(0.3, 0.3), noise=0.0)
     assert modal.with_close_modes is None

@@ -72,10 +72,27 @@ def test_the_tolerance_is_all_of_the_time_where_the_error_never_grows() -> None:
     assert find_tolerance(flat, 1.0, 0.1) == 2.0
 
 
-def test_an_error_that_grows_at_once_leaves_the_way_to_the_next_time() -> None:
+def test_an_error_that_grows_at_once_is_interpolated_from_tr_on() -> None:
     steep = Profile(np.linspace(0, 4, 5), np.array([1.0, 1.0, 0.0, 1.0, 1.0]))
     assert find_tolerance(steep, 2.0, 0.0) == pytest.approx(0.05)
-    assert find_tolerance(steep, 0.5, 0.2) == pytest.approx(0.5)
+    # At both neighbours of this tr the error is 1, so it grows by 0.05 in 1/16 of the way to them.
+    assert find_tolerance(steep, 0.5, 0.2) == pytest.approx(0.5 / 16)
+
+
+@given(st.floats(0.2, 0.8), st.floats(0.01, 0.3), st.floats(2, 50))
+def test_the_tolerance_of_a_tr_between_two_times_follows_from_the_error_at_it(
+    between: float, least: float, steepness: float
+) -> None:
+    """The error of deformations that pass each other closely is a hyperbola in time, with its vertex at this tr."""
+    time = np.arange(-5.0, 6.0) - between
+    profile = Profile(time, np.hypot(least, steepness * time))
+    tolerance = find_tolerance(profile, 0.0, least)
+    exact = np.sqrt((least + measures.TOLERATED_GROWTH) ** 2 - least**2) / steepness
+    # A hyperbola is convex, so the straight line from its vertex to the next time lies above it.
+    assert tolerance <= exact * (1 + 1e-9)
+    neighbours = np.array([between, 1 - between])
+    slopes = (np.hypot(least, steepness * neighbours) - least) / neighbours
+    assert tolerance == pytest.approx(measures.TOLERATED_GROWTH / slopes.max())
 
 
 def test_a_td_at_which_a_mode_sets_in_has_nothing_before_it_to_compare() -> None:

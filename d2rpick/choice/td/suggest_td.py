@@ -157,9 +157,13 @@ def choose_td(
         history.check(*window, subject="the longest flight,")
     look = make_look(history, settings, since)
     situation, inside = find_best_known(look, history, window)
-    choose = _choose_by_level if situation.vibration.unknown else _choose_by_residual
-    choose = _choose_by_modes if situation.basis == "modal" else choose
-    chosen, longest = choose(situation, inside, look)
+    chosen, longest = _choose_by_model(situation, inside, look)
+    if chosen is None:
+        # A model may be known at the last td although none was known where the window was examined.
+        last_situation = make_look(history, settings, since, quick=False)(inside[1])
+        if last_situation.vibration.unknown is None:
+            look = last_situation.at
+            chosen, longest = _choose_by_model(last_situation, inside, look)
     td = chosen if chosen is not None else inside[1]
     if look(td).at_rest:
         last = _find_last_at_rest(situation, inside)
@@ -362,26 +366,42 @@ def _find_flying(look: Look, window: tuple[float, float]) -> Situation:
     """Return the first situation with the most certain flight, at the start, middle or end of the range.
 
     Of flights of equal certainty, a flight that covers a part of the window is preferred to one that only ends in it.
+    Then a td whose deformation is known is preferred.
     """
     low, high = window
     situations = []
     for td in (low, (low + high) / 2, high):
         situations.append(look(td))
-        if _rate_certainty(situations[-1], window) == (False, 0, False):
+        if _rate_certainty(situations[-1], window) == (False, 0, False, False):
             break  # No situation can be more certain than this one.
     return min(situations, key=lambda situation: _rate_certainty(situation, window))
 
 
 def _rate_certainty(
     situation: Situation, window: tuple[float, float]
-) -> tuple[bool, int, bool]:
+) -> tuple[bool, int, bool, bool]:
     """Return a sort key for the certainty that td lies in a flight; the smallest key means the greatest certainty."""
     low, high = window
     start, end = situation.flight.within(situation.history.time)
     only_ends_in_it = min(end, high) - max(start, low) < MIN_RIGID * (high - low)
     source = situation.flight.source
     rank = len(SOURCES) if source is None else SOURCES.index(source)
-    return not situation.in_flight, rank, only_ends_in_it
+    is_unknown = situation.vibration.unknown is not None
+    return not situation.in_flight, rank, only_ends_in_it, is_unknown
+
+
+def _choose_by_model(
+    situation: Situation, window: tuple[float, float], look: Look
+) -> tuple[float | None, float | None]:
+    """Return the chosen td, and the td of the longest acceptable window, by what is known of the vibration.
+
+    Either is None if no pair is acceptable.
+    """
+    if situation.basis == "modal":
+        return _choose_by_modes(situation, window, look)
+    if situation.vibration.unknown:
+        return _choose_by_level(situation, window, look)
+    return _choose_by_residual(situation, window, look)
 
 
 def _choose_by_residual(
@@ -396,6 +416,8 @@ def _choose_by_residual(
         look(td) for td in dict.fromkeys((*highest, *peaks[-_MOST_PEAKS:]))
     )
     pairs = pairs or _select_acceptable(map(look, window))
+    # The level error of a pair whose deformations are unknown is no residual, so the two are not compared.
+    pairs = [pair for pair in pairs if pair[1].residual is not None] or pairs
     limit = min(
         (best.error for _, best in pairs), default=0.0
     ) + get_limit_of_like_quality(situation)
