@@ -18,6 +18,7 @@ from d2rpick.choice.pair.warnings import (
     describe_end_of_flight,
     describe_end_of_load,
 )
+from d2rpick.choice.pair.quality import name_parts_in_verify
 from d2rpick.choice.parts.deck_of_run import add_surroundings
 from d2rpick.choice.question import Reference, Settings
 from d2rpick.deck import read_inventory
@@ -255,7 +256,7 @@ class HistoryJudge:
         for caution in verdict.cautions:
             if caution.code in _KEPT:
                 self._cautions.setdefault(caution, []).extend(parts)
-        return Judgement(tuple(find_faults(verdict)), verdict.decision)
+        return Judgement(tuple(find_faults(verdict)), _decide_in_check(verdict))
 
 
 def _find_times_outside(
@@ -287,9 +288,15 @@ def _find_times_outside(
         )
 
 
+def _decide_in_check(verdict: PairVerdict) -> Decision:
+    """Return the verdict on a pair, with cures that refer to no option that the check lacks."""
+    decision = verdict.decision
+    return decision._replace(quality=name_parts_in_verify(decision.quality))
+
+
 def find_faults(verdict: PairVerdict) -> Iterator[Fault]:
     """Yield the problems that follow from a verdict; an inadmissible pair leads to at least one error."""
-    situation, decision = verdict.situation, verdict.decision
+    situation, decision = verdict.situation, _decide_in_check(verdict)
     limit_faults = [*_judge_limits(verdict)]
     faults = [*_judge_flight(verdict), *_judge_error(verdict), *limit_faults]
     if not verdict.admissible and not faults:
