@@ -11,14 +11,13 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 from d2rpick.base.errors import Caution, DeckError, give_if_written, name_units
 from d2rpick.choice.answers import PairVerdict, find_better_pair, suggest_at, verify_run
 from d2rpick.choice.health import WRONG_ENERGY
-from d2rpick.choice.pair.quality import list_exceeded_limits
+from d2rpick.choice.pair.quality import list_exceeded_limits, name_parts_in_verify
 from d2rpick.choice.pair.situation import examine_td
 from d2rpick.choice.pair.warnings import (
     POOR_KINETIC_SHARE,
     describe_end_of_flight,
     describe_end_of_load,
 )
-from d2rpick.choice.pair.quality import name_parts_in_verify
 from d2rpick.choice.parts.deck_of_run import add_surroundings
 from d2rpick.choice.question import Reference, Settings
 from d2rpick.deck import read_inventory
