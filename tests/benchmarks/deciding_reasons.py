@@ -52,12 +52,15 @@ _NAMES: Final = {
         vibration.span._BEGINNINGS vibration.span._ENDS vibration.span._EARLIER_ENDS
         vibration.span._MEANS_PER_PERIOD vibration.span._MEANS_PER_ENERGY_PERIOD vibration.span.MOST_REFITS
         vibration.span._MOST_LINES vibration.span._FINER vibration.span._CELLS_PER_PERIOD
+        vibration.close_modes._MOST_STEPS vibration.close_modes._CONVERGED vibration.close_modes._DAMPING
+        vibration.close_modes._LEAST_DAMPING vibration.close_modes._MOST_DAMPING vibration.lines.PERFECT
         """,
     _WORDING: """
         choice.pair.decision._ALIKE choice.pair.quality._NAMED choice.pair.warnings._FEW_STATES
         choice.pair.warnings._NOTABLE_PLASTIC choice.runs.study._FENCE choice.runs.study.NAMED
         choice.td.suggest_td._MUCH choice.td.trade_off._MUCH_LESS choice.td.trade_off._LEAST_KEPT
         flight.flight._SAME flight.flight._SAME_STATES vibration.model._GAP
+        choice.pair.grades._COARSE
         """,
     _INPUT: """
         choice.health._SMALL_PART choice.health._WITHIN choice.health._GAIN choice.health._SPEED
@@ -114,6 +117,9 @@ _NAMES: Final = {
         vibration.swings._OFF_FLOOR vibration.swings._MOST_OFF vibration.swings._FEWEST vibration.swings._UNEVEN
         vibration.swings._MOST_BEATING vibration.swings._STRETCHED vibration.swings._OF_ANY_SPRING
         vibration.swings._OF_THE_FLOOR vibration.swings._UNRESOLVED
+        vibration.close_modes._MOST_STATIC vibration.close_modes._LEAST_CHANGE vibration.close_modes._AS_WELL
+        vibration.hidden_energy._LIKE_LEVEL vibration.hidden_energy._HIDDEN_LINES vibration.lines._LEAST_TURNS
+        vibration.lines._SURE_TURNS vibration.modal._EXACT vibration.modal._SLOW_TOO
         """,
     _FACT: """
         choice.health.MOST_HOURGLASS choice.health.MOST_IMBALANCE choice.health.MOST_SLIDING
@@ -121,6 +127,7 @@ _NAMES: Final = {
         choice.pair.quality.MOST_WORTH_OF_FAIR choice.parts.calibration._US flight.free_fall._OF_DECKS
         vibration.locked_lines._THIRD_OF_SPRING vibration.locked_lines._HIGHEST_SECOND
         vibration.modal._MOST_OPPOSED
+        vibration.close_modes._OF_ENDS
         """,
 }
 REASONS: Final = {

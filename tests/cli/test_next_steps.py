@@ -9,7 +9,13 @@ from pathlib import Path
 import pytest
 
 from d2rpick.choice.pair.grades import VERDICTS
-from d2rpick.choice.pair.quality import Cause, Grade, Quality, omit_comparison
+from d2rpick.choice.pair.quality import (
+    Cause,
+    Grade,
+    Quality,
+    name_parts_in_verify,
+    omit_comparison,
+)
 from tests import variants
 from tests.command import (
     BOX,
@@ -159,6 +165,19 @@ def test_after_the_comparison_with_a_switched_run_none_is_asked_for() -> None:
     quality = omit_comparison(Quality(grade, grade, grade))
     cures = {cause.cure for cause in (*quality.causes, *quality.alone.causes)}
     assert cures == {"write more often"}
+
+
+def test_a_check_advises_no_option_that_it_lacks() -> None:
+    """The parts of a window come from the deck, so the cure names the command that has the option --part."""
+    cure = "name the parts to be switched with `parts`, if the files contain parts"
+    grade = Grade("poor", (Cause("unknown", cure),))
+    quality = name_parts_in_verify(Quality(grade, grade, grade))
+    cures = {cause.cure for cause in (*quality.causes, *quality.alone.causes)}
+    assert cures == {
+        "judge the pair with d2rpick verify by the energy of its parts (`parts`), if the files contain parts"
+    }
+    check_options = run("check", "--help").stdout
+    assert "--part" not in check_options
 
 
 @pytest.mark.slow

@@ -25,7 +25,7 @@ from d2rpick.vibration.measures import TOLERATED_GROWTH
 from d2rpick.vibration.model import NOTHING_KEPT
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from numpy.typing import NDArray
 
@@ -66,6 +66,10 @@ _FEW_STATES: Final = 20
 _NAMED: Final = 5
 _WRONG_BY_MORE: Final = "the vibration after td is wrong by more than"
 _MORE_OFTEN: Final = "write the energies more often"
+_NAME_PARTS: Final = "name the parts to be switched with `parts`"
+_VERIFY_PARTS: Final = (
+    "judge the pair with d2rpick verify by the energy of its parts (`parts`)"
+)
 CHOOSE_TIMES_IN_FLIGHT: Final = "choose tr and td in one flight"
 _CORRECT_THE_DECK: Final = "correct the deck, and run the reference again"
 _CHECK_GIVEN_TIMES: Final = (
@@ -497,18 +501,25 @@ def _describe_unknown_direction(situation: Situation) -> Cause:
 
 def omit_comparison(quality: Quality) -> Quality:
     """Return the grades without the advice to compare with a switched run, for use after this comparison."""
+    return _edit_cures(quality, lambda cure: cure.removesuffix(_OR_COMPARE))
 
-    def omit(grade: Grade) -> Grade:
-        causes = [
-            cause._replace(cure=cause.cure.removesuffix(_OR_COMPARE))
-            for cause in grade.causes
-        ]
+
+def name_parts_in_verify(quality: Quality) -> Quality:
+    """Return the grades for a check, which has no option for parts: its cure names the command that has one."""
+    return _edit_cures(quality, lambda cure: cure.replace(_NAME_PARTS, _VERIFY_PARTS))
+
+
+def _edit_cures(quality: Quality, edit: Callable[[str], str]) -> Quality:
+    """Return the grades with every cure replaced by what ``edit`` returns for it."""
+
+    def edit_grade(grade: Grade) -> Grade:
+        causes = [cause._replace(cure=edit(cause.cure)) for cause in grade.causes]
         return grade._replace(causes=tuple(causes))
 
     return quality._replace(
-        motion=omit(quality.motion),
-        vibration=omit(quality.vibration),
-        alone=omit(quality.alone),
+        motion=edit_grade(quality.motion),
+        vibration=edit_grade(quality.vibration),
+        alone=edit_grade(quality.alone),
     )
 
 
@@ -539,7 +550,7 @@ def _describe_cure_for_modes(situation: Situation) -> str:
     """Return the cure that would show the modes of the vibration: other parts or more states."""
     other_parts = situation.together.not_chosen.parts
     if situation.history.parts is None and not other_parts:
-        return "name the parts to be switched with `parts`, if the files contain parts"
+        return f"{_NAME_PARTS}, if the files contain parts"
     if other_parts:
         names = list_names([part.name for part in other_parts], most=_NAMED)
         vibrates = "it vibrates" if len(other_parts) == 1 else "they vibrate"
