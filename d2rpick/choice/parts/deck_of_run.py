@@ -241,7 +241,12 @@ def add_deck_to_settings(
         if code in RUINS
     )
     history = reference.history
-    settings = replace(settings, kept_off=inventory.kept_off, ruined=ruined)
+    settings = replace(
+        settings,
+        kept_off=inventory.kept_off,
+        kept_deformable=_list_parts_kept_deformable(inventory),
+        ruined=ruined,
+    )
     if not history.parts:
         why = "name the switched parts with `parts`"
         if settings.cost_share is None:
@@ -271,6 +276,15 @@ def add_deck_to_settings(
             Caution("cost-unknown", f"the CPU time is not estimated: {share.reason}")
         )
     return with_cost, tuple(doubts)
+
+
+def _list_parts_kept_deformable(inventory: Inventory) -> tuple[int, ...]:
+    """Return the springs, and the parts whose material or solids a rigid body does not allow."""
+    return tuple(
+        part
+        for part, data in inventory.parts.items()
+        if part in inventory.springs or data.unswitchable or not data.section.turns
+    )
 
 
 def add_surroundings(run: OpenedRun, inventory: Inventory | None) -> OpenedRun:
