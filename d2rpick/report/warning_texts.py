@@ -346,6 +346,12 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "similar formulation, so the saving is a rough estimate.",
             "Calibrate with runs of your own solver (d2rpick calibrate).",
         ),
+        "built-in-weights": Explanation(
+            "Your weights lack some element formulations of the deck. For these, d2rpick uses the built-in weights, "
+            "multiplied by the median ratio of your weights to the built-in weights.",
+            "Calibrate also with runs that contain these formulations (d2rpick calibrate), or add their weights under "
+            "[per_element].",
+        ),
     },
     "Plans": {
         "done-without-flight": Explanation(

@@ -190,6 +190,11 @@ def warn_about_cost(model: CostModel, *, used: bool = True) -> Iterator[Caution]
     if used and model.assumed:
         taken = f"the cost of {', '.join(model.assumed)} was not measured; the cost of a similar formulation is used"
         yield Caution("weights-by-analogy", taken)
+    if used and model.built_in:
+        source = model.weights.file.name if model.weights.file else "`weights`"
+        lack = f"{source} has no weight for {', '.join(model.built_in)}"
+        scaled = "the built-in weights are used, scaled to the given ones"
+        yield Caution("built-in-weights", f"{lack}; {scaled}")
 
 
 def _describe_differing(differing: Sequence[Part], inventory: Inventory) -> str:
