@@ -267,7 +267,7 @@ def _build_verdict(answer: PairVerdict, record: page.PageContext) -> Iterator[Ma
         times,
         situation.history,
         [
-            *map(verdict.list_comparison_verdict, filter(None, [answer.switched])),
+            *verdict.list_comparison(answer),
             *verdict.list_pair_evidence(answer),
         ],
     )

@@ -1,9 +1,13 @@
 """The first lines of the output say what to decide, and on which limit the decision is based."""
 
+from dataclasses import replace
+
 import pytest
 
+import d2rpick
 from d2rpick.choice.options import Limit
 from d2rpick.choice.switched.comparison import MOST_MOMENTUM_ERROR
+from d2rpick.report.formats import DisplayOptions
 from tests.command import MATSUM, ROOT, run, run_json
 
 SAMPLES = ROOT / "sample_data"
@@ -106,3 +110,38 @@ def test_a_plan_says_in_which_run_a_window_can_be_used(
     )
     assert lines[head].split()[-2:] == ["switch", "in"]
     assert lines[head + 1].endswith(cell)
+
+
+def test_limits_that_are_kept_do_not_praise_a_pair_that_is_not_to_be_used() -> None:
+    result = run(*SWITCHED[:2], "--max-residual", "0.01", *SWITCHED[2:])
+    assert result.exit_code == 1
+    text = join_lines(result.stdout)
+    assert text.startswith("do not use tr = ")
+    assert "passed" not in text
+    decided, compared = text.split(" comparison ")
+    assert "why residual 0.0386 above the limit 0.01" in decided
+    assert compared.startswith("within limits: mean energy after td 108% of the")
+    assert (
+        "this does not show that the vibration is kept: standard deviation of the energy after td 2.12, in the "
+        "reference run 2.08" in compared
+    )
+
+
+@pytest.mark.parametrize(
+    ("ratio", "usable"),
+    [(0.2, "only the motion"), (1, "the results"), (12, "only the motion")],
+)
+def test_a_switched_run_that_vibrates_differently_is_used_for_the_motion_only(
+    ratio: float, usable: str
+) -> None:
+    reference = d2rpick.read(SAMPLES / "oscillator")
+    computed = d2rpick.read(SAMPLES / "oscillator_switched")
+    answer = d2rpick.verify(reference, switched=computed)
+    switched = answer.switched
+    assert switched
+    spread = ratio * switched.spread_after_reference
+    differing = replace(answer, switched=switched._replace(spread_after=spread))
+    text = join_lines(differing.text("table", DisplayOptions()))
+    assert f"use {usable} of the switched run" in text
+    is_named = f"standard deviation of the energy after td {spread:.3g}, in" in text
+    assert is_named is (ratio != 1)

@@ -184,7 +184,7 @@ def test_a_check_advises_no_option_that_it_lacks() -> None:
     quality = name_parts_in_verify(Quality(grade, grade, grade))
     cures = {cause.cure for cause in (*quality.causes, *quality.alone.causes)}
     assert cures == {
-        "judge the pair by the energy of its parts with d2rpick verify --part, if the files contain parts"
+        "judge the pair with d2rpick verify by the energy of its parts (`parts`), if the files contain parts"
     }
     check_options = run("check", "--help").stdout
     assert "--part" not in check_options

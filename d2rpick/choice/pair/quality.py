@@ -69,7 +69,7 @@ _WRONG_BY_MORE: Final = "the vibration after td is wrong by more than"
 _MORE_OFTEN: Final = "write the energies more often"
 _NAME_PARTS: Final = "name the parts to be switched with `parts`"
 _VERIFY_PARTS: Final = (
-    "judge the pair by the energy of its parts with d2rpick verify --part"
+    "judge the pair with d2rpick verify by the energy of its parts (`parts`)"
 )
 CHOOSE_TIMES_IN_FLIGHT: Final = "choose tr and td in one flight"
 _CORRECT_THE_DECK: Final = "correct the deck, and run the reference again"
