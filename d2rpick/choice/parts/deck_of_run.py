@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
     from d2rpick.choice.question import Reference, Settings
     from d2rpick.deck.model import Gravity, Hold, Inventory
+    from d2rpick.histories.history import History
     from d2rpick.histories.names import Part
     from d2rpick.histories.run import OpenedRun
 
@@ -170,6 +171,23 @@ def warn_about_solver(
         )
 
 
+def warn_about_other_solver(
+    history: History, inventory: Inventory
+) -> Iterator[Caution]:
+    """Yield a warning if one solver wrote the history and the deck is for the other solver."""
+    from d2rpick.deck.printing import SOLVERS  # Imported here to keep start-up fast.
+
+    for name, solver in SOLVERS.items():
+        if name != inventory.solver and history.energy_format in solver.histories:
+            deck = inventory.files[0].name
+            files = ", ".join(history.source)
+            text = f"{files} was written by {solver.title}, but {deck} is a deck of {SOLVERS[inventory.solver].title}"
+            use = (
+                "check that both describe the same model, or give the deck of this run"
+            )
+            yield Caution("deck-of-another-solver", f"{text}; {use}")
+
+
 def warn_about_left_rigid(run: OpenedRun, inventory: Inventory) -> Iterator[Caution]:
     """Yield a warning if parts that deform in the history are rigid in the deck."""
     left_rigid = inventory.left_rigid
@@ -239,6 +257,7 @@ def add_deck_to_settings(
     doubts_of_parts = (
         *warn_about_solver(ids, inventory),
         *warn_about_left_rigid(reference.run, inventory),
+        *warn_about_other_solver(reference.history, inventory),
     )
     ruined = tuple(
         RUINS[code]
