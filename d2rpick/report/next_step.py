@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from d2rpick.base.errors import list_names
+from d2rpick.base.errors import COPY_AGAIN, list_names
 from d2rpick.choice.pair.grades import DO_NOT_USE
 from d2rpick.deck.beside import find_deck_beside
 from d2rpick.report.tables import make_positional, quote_shell_line
@@ -199,6 +199,26 @@ def _name_step_to_better_record(decision: Decision, question: RepeatedQuestion) 
         line = write_command(_allow_deck(question), "suggest", *words)
         return f"judge the run with its deck: {line}{deck.hint}"
     return f"improve the record: {decision.cure}; no pair of it can be used before"
+
+
+def add_step_to_copy(
+    history: History, steps: Sequence[tuple[str, str]]
+) -> list[tuple[str, str]]:
+    """Return the next steps; if the files end within a state, the first one is to copy them again.
+
+    The line before it says that the verdict is that of the part that was read.
+    """
+    if history.complete:
+        return [*steps]
+    end = f"the record ends early, at {history.end:.6g}, within a state"
+    rest = "; ".join(step for _, step in steps)
+    return [
+        ("note", f"{end}: only the part before was read and judged"),
+        (
+            "next",
+            f"{COPY_AGAIN}{f'. For the part that was read: {rest}' if rest else ''}",
+        ),
+    ]
 
 
 def name_lack_of_pairs(question: RepeatedQuestion) -> str:

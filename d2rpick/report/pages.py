@@ -452,7 +452,7 @@ def _build_window_card(row: PlannedFlight, answer: RunPlan) -> Markup:
     assert row.candidate is not None
     assert row.decision is not None
     facts = [
-        ("rigid for", format_rigid_time(row.candidate)),
+        ("rigid for", format_rigid_time(row.candidate, answer.history)),
         *list_statements(row.decision),
     ]
     title = f"Flight {row.number}: "

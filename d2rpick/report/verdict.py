@@ -18,6 +18,7 @@ from d2rpick.report.decision import (
 )
 from d2rpick.report.fields import Document, Field, get_kind, maybe, row
 from d2rpick.report.next_step import (
+    add_step_to_copy,
     name_step_after_refusal,
     name_step_with_pair,
     write_command,
@@ -137,7 +138,7 @@ def list_next_step(
     else:
         pair = (answer.candidate.tr, answer.td)
         step = name_step_with_pair(situation, pair, decision.better, question, "card")
-    return [("next", step)]
+    return add_step_to_copy(situation.history, [("next", step)])
 
 
 def _name_usable_results(answer: PairVerdict) -> str:
@@ -232,7 +233,10 @@ def _describe_spread(switched: Comparison) -> str:
 def list_pair_evidence(answer: PairVerdict) -> list[tuple[str, str]]:
     """Return the evidence for the verdict, the rigid time, and the accuracy of tr, each with its name."""
     best = answer.candidate
-    lines = [*list_statements(answer.decision), ("rigid for", format_rigid_time(best))]
+    lines = [
+        *list_statements(answer.decision),
+        ("rigid for", format_rigid_time(best, answer.situation.history)),
+    ]
     if best.run_time_share is not None:
         lines.append(("saves", format_saved_share(best.run_time_share)))
     if exact := format_accuracy(best):

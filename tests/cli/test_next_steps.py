@@ -3,6 +3,7 @@
 import html
 import re
 import shlex
+from math import sin
 from pathlib import Path
 
 import pytest
@@ -748,3 +749,29 @@ def test_the_better_pair_of_verify_is_good_at_once(tr: str, td: str) -> None:
     # A row of the candidates at this td names the same pair.
     candidates = run_json("suggest", "--td", td, ENERGY)["candidates"]
     assert verdict["cure"] in {row["cure"] for row in candidates}
+
+
+def test_no_step_asks_for_an_end_of_the_load_that_the_momentum_denies(
+    tmp_path: Path,
+) -> None:
+    """A block slides with friction all the time."""
+    times = [state / 400 for state in range(401)]
+    lines = [
+        f"{time},{5 + 5 * sin(30 * time) ** 2},{500 - 40 * time},0,0,10"
+        for time in times
+    ]
+    head = "time,internal_energy,x_momentum,y_momentum,z_momentum,mass"
+    table = tmp_path / "slide.csv"
+    table.write_text("\n".join([head, *lines]))
+    for command in ("plan", "suggest", "explore", "info"):
+        answer = run(command, str(table))
+        text = " ".join((answer.stdout + answer.stderr).split())
+        assert "--after" not in text
+        assert "no flight is found" in text or "no free flight is found" in text
+    given = run("plan", "--after", "0.2", str(table))
+    text = " ".join(given.stdout.split())
+    assert text.startswith("use with care: make rigid from ")
+    assert (
+        " why the motion is good only if the parts fly as you stated with --after: the flight is used as given, "
+        "although the momentum shows no free flight" in text
+    )

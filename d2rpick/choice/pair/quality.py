@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     from d2rpick.choice.pair.candidates import Candidate, Judged
     from d2rpick.choice.pair.moving_apart import MovingApart
     from d2rpick.choice.pair.situation import Situation
-    from d2rpick.flight.flight import Flight
     from d2rpick.histories.history import History, Samples
 
 # Deformation errors that exceed the smallest error by at most this are treated as equal [-].
@@ -368,11 +367,18 @@ class Quality(NamedTuple):
         return tuple(cause.reason for cause in self.causes)
 
 
-def _explain_uncertain_flight(flight: Flight) -> Cause:
+def _explain_uncertain_flight(situation: Situation) -> Cause:
     """Return why a flight is uncertain: what contradicts the times given by the user, or what evidence is missing."""
+    flight = situation.flight
     if flight.source == "given" and flight.doubts:
+        settings = situation.settings
+        times = (("`after`", settings.after), ("`landing`", settings.landing))
+        given = " and ".join(name for name, time in times if time is not None)
+        condition = (
+            f"the motion is good only if the parts fly as you stated with {given}"
+        )
         return Cause(
-            flight.doubts[-1],
+            f"{condition}: {flight.doubts[-1]}",
             _CHECK_GIVEN_TIMES,
             kind="the evidence contradicts the flight that was given",
         )
@@ -410,7 +416,7 @@ def grade_pair(
     ``best_residual`` is the residual of the best tr at this td [-]; None if it is unknown or if this is the best tr.
     """
     flight = situation.flight
-    uncertain = () if flight.certain else (_explain_uncertain_flight(flight),)
+    uncertain = () if flight.certain else (_explain_uncertain_flight(situation),)
     outside = list_times_outside_flight(situation, best.tr)
     ruined = [
         *(Cause(fault, CHOOSE_TIMES_IN_FLIGHT) for fault in outside),
