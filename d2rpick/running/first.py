@@ -59,7 +59,7 @@ def first_card(
         chosen = chosen or find_parts_off(read_run(path))
     if not chosen:
         raise ArgumentError(
-            f"no parts were given, and {path} keeps no body off; name them with `parts`"
+            f"no parts were given, and {path} deactivates no rigid body (/RBODY/OFF); name them with `parts`"
         )
     refuse_held(path, inventory, chosen)
     needed = _choose_wait(path, inventory, wait)
