@@ -15,7 +15,7 @@ import numpy as np
 
 from d2rpick.choice.pair.decision import format_bounds
 from d2rpick.histories.samples import draw_outline
-from d2rpick.report.decision import format_saved_share
+from d2rpick.report.decision import format_saved_share, is_refused
 from d2rpick.report.page import (
     CLASSES,
     Explorer,
@@ -297,7 +297,9 @@ def _build_offer_table(trade_off: TradeOff, first: Offer, view: View) -> dict[st
         ),
         "saved": lambda offer: _round_number(_compute_saved_percentage(offer)),
         "error": lambda offer: _round_number(offer.error),
-        "windows": lambda offer: _mark_columns(offer.answer.windows or (), view),
+        "windows": lambda offer: _mark_columns(
+            _list_usable_windows(offer, trade_off.decide_on(offer)), view
+        ),
         "peak": lambda offer: int(offer.peak),
         "unbeaten": lambda offer: int(offer.unbeaten),
     }
@@ -382,18 +384,25 @@ def _list_texts(
         "badge": decision and CLASSES[decision.verdict],
         "cure": decision and decision.cure,
         "reason": offer.answer.why_none,
-        **(_list_texts_of_best(offer, best, unit) if best else {}),
+        **(_list_texts_of_best(offer, decision, best, unit) if best else {}),
         "compared": _compare_offers(offer, start, unit),
         "said": _format_for_screen_reader(offer),
     }
 
 
+def _list_usable_windows(
+    offer: Offer, decision: Decision | None
+) -> Sequence[AcceptableWindow]:
+    """Return the windows of admissible tr; none if the verdict forbids them."""
+    return () if is_refused(decision) else offer.answer.windows or ()
+
+
 def _list_texts_of_best(
-    offer: Offer, best: Candidate, unit: str
+    offer: Offer, decision: Decision | None, best: Candidate, unit: str
 ) -> dict[str, str | None]:
     """Return the texts about the recommended tr of a td."""
     kept_share = offer.answer.mean_energy_bounds
-    windows = offer.answer.windows
+    windows = _list_usable_windows(offer, decision)
     return {
         "residual": format_if_known(best.residual, ".3f"),
         "after": None
