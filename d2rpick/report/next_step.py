@@ -276,7 +276,7 @@ def name_step_after_refusal(
         return f"choose both times in the flight with {line}"
     if better is not None:
         return name_step_to_better_pair(better, question)
-    missing = situation.together.not_chosen.parts if question.parts else ()
+    missing = situation.parts_to_add if question.parts else ()
     if missing:
         parts = (*(situation.history.parts or ()), *missing)
         ids = sorted(part.id for part in parts)

@@ -347,6 +347,17 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "formulation, measured with OpenRadioss, so the saving is a rough estimate.",
             "Calibrate with runs of your own solver (d2rpick calibrate).",
         ),
+        "deck-of-another-solver": Explanation(
+            "One solver wrote the history, and the deck is for the other solver. d2rpick uses the loads, connections "
+            "and costs of the deck, which hold only if both describe the same model.",
+            "Give the deck of the run, or check that both models are the same.",
+        ),
+        "built-in-weights": Explanation(
+            "Your weights lack some element formulations of the deck. For these, d2rpick uses the built-in weights, "
+            "multiplied by the median ratio of your weights to the built-in weights.",
+            "Calibrate also with runs that contain these formulations (d2rpick calibrate), or add their weights under "
+            "[per_element].",
+        ),
     },
     "Plans": {
         "done-without-flight": Explanation(

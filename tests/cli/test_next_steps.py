@@ -167,6 +167,17 @@ def test_after_the_comparison_with_a_switched_run_none_is_asked_for() -> None:
     assert cures == {"write more often"}
 
 
+@pytest.mark.slow
+def test_no_spring_is_advised_to_become_rigid() -> None:
+    """The energy of springs with dampers would be left out, so that choosing them too changes nothing."""
+    car = str(ROOT / "tests/data/carT01.gz")
+    answer = run_json("suggest", "--part", "1-14", car)
+    assert answer["verdict"] == "do not use"
+    assert answer["cure"] == "compare with a finished switched run"
+    step = find_line("next", "suggest", "--part", "1-14", car)
+    assert "15" not in step
+
+
 def test_a_check_advises_no_option_that_it_lacks() -> None:
     """The parts of a window come from the deck, so the cure names the command that has the option --part."""
     cure = "name the parts to be switched with `parts`, if the files contain parts"

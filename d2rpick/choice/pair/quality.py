@@ -77,7 +77,8 @@ _CHECK_GIVEN_TIMES: Final = (
     "or let the evidence decide, without `after` and `landing`"
 )
 # End of the advice on a pair, which is omitted if a finished switched run is already available.
-_OR_COMPARE: Final = ", or compare with a finished switched run"
+_COMPARE: Final = "compare with a finished switched run"
+_OR_COMPARE: Final = f", or {_COMPARE}"
 
 
 def rank_candidates(
@@ -490,18 +491,22 @@ def _describe_unknown_direction(situation: Situation) -> Cause:
             kind=unknown,
         )
     for_modes = _describe_cure_for_modes(situation)
-    if not cures or for_modes != _MORE_OFTEN:
+    if for_modes and (not cures or for_modes != _MORE_OFTEN):
         cures.append(for_modes)
     return Cause(
         f"{unknown}{why}",
-        f"{', '.join(cures)}{_OR_COMPARE}",
+        f"{', '.join(cures)}{_OR_COMPARE}" if cures else _COMPARE,
         kind=unknown,
     )
 
 
 def omit_comparison(quality: Quality) -> Quality:
     """Return the grades without the advice to compare with a switched run, for use after this comparison."""
-    return _edit_cures(quality, lambda cure: cure.removesuffix(_OR_COMPARE))
+
+    def omit(cure: str) -> str:
+        return _MORE_OFTEN if cure == _COMPARE else cure.removesuffix(_OR_COMPARE)
+
+    return _edit_cures(quality, omit)
 
 
 def name_parts_in_verify(quality: Quality) -> Quality:
@@ -547,15 +552,18 @@ def _ask_for_more_states(situation: Situation) -> Iterator[str]:
 
 
 def _describe_cure_for_modes(situation: Situation) -> str:
-    """Return the cure that would show the modes of the vibration: other parts or more states."""
-    other_parts = situation.together.not_chosen.parts
+    """Return the cure that would show the modes of the vibration: other parts or more states.
+
+    It is empty if all other vibrating parts are springs or the like, whose energy a choice of parts would not add.
+    """
+    other_parts = situation.parts_to_add
     if situation.history.parts is None and not other_parts:
         return f"{_NAME_PARTS}, if the files contain parts"
     if other_parts:
         names = list_names([part.name for part in other_parts], most=_NAMED)
         vibrates = "it vibrates" if len(other_parts) == 1 else "they vibrate"
         return f"also make {names} rigid, because {vibrates} together with the chosen parts"
-    return _MORE_OFTEN
+    return "" if situation.together.not_chosen.parts else _MORE_OFTEN
 
 
 def _describe_wrong_tr(
