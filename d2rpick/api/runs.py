@@ -435,6 +435,7 @@ def extract_columns(
             f"part_{part.id}": column
             for part, column in zip(history.parts, energies.T, strict=True)
         }
+        table["internal_energy"] = _round_sum(history, energies)
     notes = history.notes
     not_chosen = list_flying_parts_not_chosen(history)
     energies_not_chosen = history.evidence.internal_energies(not_chosen)
@@ -453,6 +454,19 @@ def extract_columns(
         | _list_model_columns(history)
         | list_momentum_columns(history)
     ), notes
+
+
+def _round_sum(history: History, energies: Samples) -> Samples:
+    """Return the energy of a history, shape (n,), with the digits of its terms ``energies``, shape (n, parts).
+
+    A table shows its precision only by its digits, so the sum of printed numbers must not have more digits than they
+    have. The sum of binary numbers is not rounded.
+    """
+    precision = history.energy_precision
+    terms = energies.ravel()
+    if not (precision.round(terms) == terms).all():
+        return history.energy
+    return precision.round(history.energy)
 
 
 def _list_model_columns(history: History) -> dict[str, Samples]:

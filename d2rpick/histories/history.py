@@ -74,6 +74,23 @@ class Precision(NamedTuple):
         )
         return np.where(sizes > 0, 10.0**powers, 0.0)
 
+    def round(self, values: Samples) -> Samples:
+        """Return ``values`` (n,) with no more digits than were printed, in the same unit.
+
+        A sum of printed numbers has more digits than are known.
+
+        Examples
+        --------
+        >>> Precision(digits=5).round(np.array([44.181 + 0.58376, 0.0]))
+        array([44.765,  0.   ])
+        """
+        if self == EXACT:
+            return values
+        if self.decimals is not None:
+            return values.round(self.decimals)
+        printed = f"{{:.{self.digits - 1}e}}".format
+        return np.array([float(printed(value)) for value in values.tolist()])
+
     def noise(self, values: Samples) -> float:
         """Return the rounding error of printed values: half a unit of the last printed digit of the largest value."""
         return self.quantum(float(np.abs(values).max())) / 2

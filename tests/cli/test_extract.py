@@ -410,3 +410,21 @@ def test_an_undamped_replay_flies_by_its_constant_momentum(tmp_path: Path) -> No
         "flight"
     ]
     assert (flight["start"], flight["end"], flight["source"]) == (0.0, None, "momentum")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("form", ["matsum", "binout"])
+def test_an_extracted_sum_has_no_more_digits_than_its_terms(
+    tmp_path: Path, form: str
+) -> None:
+    """Digits that are not known are taken for a vibration, which spoils the verdict."""
+    source = str(ROOT / "sample_data" / f"rollover_box.{form}")
+    table = str(tmp_path / "box.csv")
+    assert run("extract", "--part", "flying", source, "-o", table).exit_code == 0
+    extracted = run_json("suggest", table)
+    original = run_json("suggest", "--no-deck", "--part", "flying", source)
+    assert extracted["verdict"] == original["verdict"] == "use with care"
+    residuals = [
+        answer["candidates"][0]["residual"] for answer in (extracted, original)
+    ]
+    assert residuals[0] == pytest.approx(residuals[1], abs=0.05)
