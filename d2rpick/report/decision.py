@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from d2rpick.choice.pair.decision import join_cures
-from d2rpick.choice.pair.grades import GOOD
+from d2rpick.choice.pair.grades import DO_NOT_USE, GOOD
 from d2rpick.choice.pair.quality import MOST_WORTH_OF_FAIR
 
 if TYPE_CHECKING:
@@ -18,6 +18,11 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History
 
     Lines = list[tuple[str, str]]
+
+
+def is_refused(decision: Decision | None) -> bool:
+    """Return True if a pair must not be used; such a pair is never called recommended or admissible."""
+    return decision is not None and decision.verdict == DO_NOT_USE
 
 
 def list_verdict_lines(decision: Decision, tr: float, td: float) -> Lines:

@@ -13,7 +13,7 @@
   }
   let flight = data.flights[data.flight], row = flight.rows[flight.start];
 
-  const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+  const colour = (name) => getComputedStyle(section).getPropertyValue(`--${name}`).trim();
   const nearest = (td) => flight.rows.reduce((best, one) => Math.abs(one.td - td) < Math.abs(best.td - td) ? one : best);
 
   // Marks on the canvas of a chart, in its pixels.
@@ -38,6 +38,21 @@
   const band = (chart, name, from, to) => mark(chart, name, 1, (context, at, _, box) => {
     context.fillRect(at(from), box.top, at(to) - at(from), box.height);
   });
+  // The verified pair is drawn wider than the best one, so that both are seen where they coincide.
+  const verified = (chart) => {
+    if (!data.verified) return;
+    const { tr, td } = data.verified;
+    mark(chart, "verified", 4, (context, at, _, box) => [tr, td].forEach((time) => {
+      context.moveTo(at(time), box.top);
+      context.lineTo(at(time), box.top + box.height);
+      context.stroke();
+    }));
+  };
+  const computed = (chart) => data.computed && mark(chart, "verified", 1.5, (context, at, height) => {
+    const [time, energy] = data.computed;
+    time.forEach((x, i) => context.lineTo(at(x), height(flight.log ? Math.max(energy[i], flight.heights[0]) : energy[i])));
+    context.stroke();
+  });
   const dot = (chart, x, y) => mark(chart, "switched", 2.5, (context, at, height) => {
     context.arc(at(x), height(y), 6 * devicePixelRatio, 0, 2 * Math.PI);
     context.stroke();
@@ -45,8 +60,12 @@
 
   const marks = {
     energy: {
-      below: (chart) => band(chart, "flight", ...flight.flight),
+      below: (chart) => {
+        band(chart, "flight", ...flight.flight);
+        verified(chart);
+      },
       above: (chart) => {
+        computed(chart);
         mark(chart, "soft", 1, (context, at, _, box) => {
           const columns = 4 * row.windows.length, left = at(flight.view[0]), width = (at(flight.view[1]) - left) / columns;
           const marked = (i) => i < columns && (parseInt(row.windows[i >> 2], 16) & (8 >> (i & 3))) !== 0;
@@ -67,7 +86,10 @@
       },
     },
     whole: {
-      below: (chart) => band(chart, "flight", ...flight.view),
+      below: (chart) => {
+        band(chart, "flight", ...flight.view);
+        verified(chart);
+      },
       above: (chart) => [row.tr, row.td].filter((time) => time !== null).forEach((time) => upright(chart, "switched", time)),
     },
     motion: {
@@ -159,7 +181,7 @@
   // The cards with a verdict at the top of the page: their pairs, and the names of what they say, which is not repeated here.
   const cards = [...document.querySelectorAll(".card:has(.badge):has(.exact)")].map((card) => ({
     pair: card.querySelector(".exact").textContent,
-    names: ["verdict", ...[...card.querySelectorAll("dt")].map((name) => name.textContent)],
+    names: [...card.querySelectorAll("dt")].map((name) => name.textContent),
   }));
 
   const spoken = (one) => `td ${one.text.td}, tr ${one.text.tr}, ${one.text.said}`;
@@ -180,6 +202,7 @@
       const line = place.closest("dl > div");
       line?.classList.toggle("empty", !text || Boolean(above?.names.includes(line.firstChild.textContent)));
     });
+    find('[data-value="verdict"]').className = row.text.badge ? `badge ${row.text.badge}` : "";
     if (charts.motion) charts.motion.setData(motion(), false);
     follow();
   }

@@ -15,8 +15,15 @@ import numpy as np
 
 from d2rpick.choice.pair.decision import format_bounds
 from d2rpick.histories.samples import draw_outline
-from d2rpick.report.decision import format_saved_share
-from d2rpick.report.page import Explorer, Markup, join, make_element, read_resource
+from d2rpick.report.decision import format_saved_share, is_refused
+from d2rpick.report.page import (
+    CLASSES,
+    Explorer,
+    Markup,
+    join,
+    make_element,
+    read_resource,
+)
 from d2rpick.report.situation import label_deformation, label_energy
 from d2rpick.report.suggestion import describe_acceptable_windows
 from d2rpick.report.tables import (
@@ -37,7 +44,7 @@ from d2rpick.report.view import (
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from d2rpick.choice.answers import AcceptableWindow
+    from d2rpick.choice.answers import AcceptableWindow, PairVerdict
     from d2rpick.choice.pair.candidates import Candidate
     from d2rpick.choice.pair.decision import Decision
     from d2rpick.choice.pair.situation import Situation
@@ -53,7 +60,6 @@ _NEXT: Final = "<!-- next -->"
 
 # Labels of the values that are shown for a pair, by value name and in display order.
 _VALUES: Final[Mapping[str, str]] = {
-    "verdict": "verdict",
     "why": "why",
     "cure": "to improve",
     "compared": "change",
@@ -68,6 +74,9 @@ _VALUES: Final[Mapping[str, str]] = {
     "windows": "admissible tr",
     "reason": "no tr",
 }
+# Title of the values, and name of the level in the legend, on the page of a verified pair.
+_BESIDE_VERIFIED: Final = "For comparison: the best pair for this td"
+_LEVEL_OF_BEST: Final = "the best pair for this td: level at td; dashed: tr"
 # Number of columns of the view that show windows of acceptable tr; the number must be a multiple of 8.
 _COLUMNS: Final = 480
 # Number of significant digits of a displayed difference.
@@ -87,15 +96,24 @@ def read_scripts() -> tuple[Markup, ...]:
     )
 
 
-def build_explorer(explored: Explorer | None) -> Markup:
+def build_explorer(
+    explored: Explorer | None, judged: PairVerdict | None = None
+) -> Markup:
     """Return the interactive section and its data; empty if there is nothing to explore.
 
     The section is hidden until its script has checked that it can run.  Charts and values stand in two columns; on a
-    narrow page the style sheet puts them below each other in another order.
+    narrow page the style sheet puts them below each other in another order.  A pair that was ``judged`` is marked
+    beside the best pair for each td, with its finished switched run.
     """
     if explored is None:
         return Markup()
-    flights = [_describe_flight(trade_off) for trade_off in explored.trade_offs]
+    verified_times = (
+        () if judged is None else (judged.candidate.tr, judged.situation.td)
+    )
+    flights = [
+        _describe_flight(trade_off, *verified_times)
+        for trade_off in explored.trade_offs
+    ]
     known_values = {
         name for flight in flights for name in flight["texts"]
     }  # Values that are unknown for all pairs are omitted.
@@ -109,7 +127,8 @@ def build_explorer(explored: Explorer | None) -> Markup:
     section, motion, values = _strip_whitespace(read_resource("explorer.html")).split(
         _NEXT
     )
-    values = Template(values).substitute(listed=join(listed))
+    title = "The best pair for this td" if judged is None else _BESIDE_VERIFIED
+    values = Template(values).substitute(listed=join(listed), title=title)
     if any(flight["motion"] for flight in flights):
         below = (motion, values)
     else:
@@ -120,6 +139,9 @@ def build_explorer(explored: Explorer | None) -> Markup:
     )
     unit = explored.trade_offs[0].situation.history.time_unit
     section = Template(section).substitute(
+        kind="explorer" if judged is None else "explorer judged",
+        level="level at td; dashed: tr" if judged is None else _LEVEL_OF_BEST,
+        judged=_build_keys_of_judged(judged),
         chooser=make_element(
             "label", "flight", make_element("select", *options, id="explorer-flight")
         )
@@ -137,8 +159,37 @@ def build_explorer(explored: Explorer | None) -> Markup:
         "flight": 0,
         "flights": flights,
         "command": [f"{command_start} ", f" {command_end}"],
+        **_list_marks_of_judged(judged, flights),
     }
     return join([Markup(section), _build_data_element("explorer-data", data)])
+
+
+def _build_keys_of_judged(judged: PairVerdict | None) -> Markup:
+    """Return the legend entries of the verified pair and of its finished switched run."""
+    names = [] if judged is None else ["the verified pair: tr and td"]
+    if judged and judged.computed:
+        names.append("switched run, as computed")
+    return join(
+        make_element("li", make_element("i", class_="verified"), name) for name in names
+    )
+
+
+def _list_marks_of_judged(
+    judged: PairVerdict | None, flights: Sequence[Mapping[str, Any]]
+) -> dict[str, Any]:
+    """Return the times of the verified pair and the energy of its finished switched run, as far as it is visible."""
+    if judged is None:
+        return {}
+    marks: dict[str, Any] = {
+        "verified": {"tr": judged.candidate.tr, "td": judged.situation.td}
+    }
+    if judged.computed:
+        start = min(flight["view"][0] for flight in flights)
+        end = max(flight["view"][1] for flight in flights)
+        visible = judged.computed.between(start, end)
+        outline = draw_outline(*visible, stretches=_STRETCHES)
+        marks["computed"] = [_round_curve(column) for column in outline]
+    return marks
 
 
 def _strip_whitespace(text: str) -> str:
@@ -154,8 +205,8 @@ def _build_data_element(name: str, content: Any) -> Markup:
     return make_element("script", Markup(text), type="application/json", id=name)
 
 
-def _describe_flight(trade_off: TradeOff) -> dict[str, Any]:
-    """Return the curves, marks and texts of one flight."""
+def _describe_flight(trade_off: TradeOff, *times: float) -> dict[str, Any]:
+    """Return the curves, marks and texts of one flight; ``times`` [time] of a verified pair are visible, too."""
     situation = trade_off.situation
     history = situation.history
     flight = situation.flight
@@ -165,7 +216,7 @@ def _describe_flight(trade_off: TradeOff) -> dict[str, Any]:
         or trade_off.start
         or trade_off.offers[-1]
     )
-    view = make_view_of_situation(situation, trade_off.offers[-1].td)
+    view = make_view_of_situation(situation, trade_off.offers[-1].td, *times)
     levels = [offer.energy_td for offer in trade_off.offers]
     scale = make_scale_of_flight(situation, view, levels)
     whole = draw_outline(history.time, history.energy, _OVERVIEW)
@@ -246,7 +297,9 @@ def _build_offer_table(trade_off: TradeOff, first: Offer, view: View) -> dict[st
         ),
         "saved": lambda offer: _round_number(_compute_saved_percentage(offer)),
         "error": lambda offer: _round_number(offer.error),
-        "windows": lambda offer: _mark_columns(offer.answer.windows or (), view),
+        "windows": lambda offer: _mark_columns(
+            _list_usable_windows(offer, trade_off.decide_on(offer)), view
+        ),
         "peak": lambda offer: int(offer.peak),
         "unbeaten": lambda offer: int(offer.unbeaten),
     }
@@ -328,20 +381,28 @@ def _list_texts(
         "kinetic": format_if_known(offer.kinetic_share, ".3f"),
         "verdict": decision and decision.verdict,
         "why": decision and decision.reason,
+        "badge": decision and CLASSES[decision.verdict],
         "cure": decision and decision.cure,
         "reason": offer.answer.why_none,
-        **(_list_texts_of_best(offer, best, unit) if best else {}),
+        **(_list_texts_of_best(offer, decision, best, unit) if best else {}),
         "compared": _compare_offers(offer, start, unit),
         "said": _format_for_screen_reader(offer),
     }
 
 
+def _list_usable_windows(
+    offer: Offer, decision: Decision | None
+) -> Sequence[AcceptableWindow]:
+    """Return the windows of admissible tr; none if the verdict forbids them."""
+    return () if is_refused(decision) else offer.answer.windows or ()
+
+
 def _list_texts_of_best(
-    offer: Offer, best: Candidate, unit: str
+    offer: Offer, decision: Decision | None, best: Candidate, unit: str
 ) -> dict[str, str | None]:
     """Return the texts about the recommended tr of a td."""
     kept_share = offer.answer.mean_energy_bounds
-    windows = offer.answer.windows
+    windows = _list_usable_windows(offer, decision)
     return {
         "residual": format_if_known(best.residual, ".3f"),
         "after": None

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 from matplotlib.collections import LineCollection
 
+from d2rpick.choice.pair.grades import DO_NOT_USE, POOR
 from d2rpick.choice.runs.study import (
     StudyOfRuns,
     StudyRow,
@@ -15,9 +16,9 @@ from d2rpick.choice.runs.study import (
 )
 from d2rpick.histories.samples import draw_outline
 from d2rpick.report import figures
+from d2rpick.report.decision import is_refused
 from d2rpick.report.figures import (
     BETTER,
-    FLIGHT,
     GOOD,
     NEUTRAL,
     REFERENCE,
@@ -52,7 +53,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.pair.situation import Situation
     from d2rpick.choice.parts.sets_of_parts import Parts
     from d2rpick.choice.td.plan import PlannedFlight, RunPlan
-    from d2rpick.choice.td.trade_off import TradeOff
+    from d2rpick.choice.td.trade_off import Offer, TradeOff
     from d2rpick.histories.history import History, Samples
 
 
@@ -139,10 +140,17 @@ def draw_suggestion(answer: PairSuggestion, *, page: bool = False) -> Figure:
     best = answer.chosen
     has_few = answer.windows is None and len(answer.candidates) <= _FEW
     drawn = tuple(answer.candidates) if has_few else (best,) if best else ()
-    bands = () if has_few else answer.acceptable_windows
+    refused = is_refused(answer.decision)
+    bands = () if has_few or refused else answer.acceptable_windows
     better = answer.clearly_better if page else None
     return _draw(
-        answer.situation, best.tr if best else None, drawn, bands, better, page=page
+        answer.situation,
+        best.tr if best else None,
+        drawn,
+        bands,
+        better,
+        refused=refused,
+        page=page,
     )
 
 
@@ -163,6 +171,7 @@ def _draw(
     better: Pair | None = None,
     *,
     computed: History | None = None,
+    refused: bool = False,
     page: bool = False,
 ) -> Figure:
     modelled = tr is not None and computed is None
@@ -173,7 +182,7 @@ def _draw(
     view = make_view_of_situation(
         situation, *(() if tr is None else (tr,)), *(better[:2] if better else ())
     )
-    _draw_energy(panels[0], situation, view, candidates, bands)
+    _draw_energy(panels[0], situation, view, candidates, bands, refused=refused)
     if computed is not None:
         panels[0].plot(
             computed.time,
@@ -207,6 +216,8 @@ def _draw_energy(
     view: View,
     candidates: Sequence[Candidate],
     bands: Sequence[tuple[float, float]],
+    *,
+    refused: bool,
 ) -> None:
     history = situation.history
     level = situation.energy_td
@@ -235,7 +246,7 @@ def _draw_energy(
         label = "_" if number else "admissible tr"
         axes.axvspan(*band, ymax=_BAND, facecolor=NEUTRAL, linewidth=0, label=label)
     for admissible, fill, name in (
-        (True, NEUTRAL, "admissible"),
+        (True, NEUTRAL, "candidates" if refused else "admissible"),
         (False, "none", "not admissible"),
     ):
         marked = [
@@ -435,10 +446,14 @@ def draw_trade_off(trade_off: TradeOff, *, page: bool = False) -> Figure:
         xlabel=td,
         ylim=(0, None),
     )
+    chosen = trade_off.recommended
+    _mark_tr(energy, trade_off, trade_off.requested or chosen)
+    is_chosen_refused = chosen is not None and is_refused(trade_off.decide_on(chosen))
+    chosen_name = f"chosen ({DO_NOT_USE})" if is_chosen_refused else "recommended"
     for axes in panels:
         for offer, colour, name in (
-            (trade_off.requested, FLIGHT, "td asked for"),
-            (trade_off.recommended, SWITCHED, "recommended"),
+            (trade_off.requested, NEUTRAL, "td asked for"),
+            (chosen, SWITCHED, chosen_name),
         ):
             if offer:
                 axes.axvline(
@@ -451,6 +466,22 @@ def draw_trade_off(trade_off: TradeOff, *, page: bool = False) -> Figure:
     else:
         figures.add_legend_below(figure, panels, size=None)
     return figure
+
+
+def _mark_tr(axes: Axes, trade_off: TradeOff, offer: Offer | None) -> None:
+    """Write the pair with its verdict above the energy; mark its tr, if the td range contains it."""
+    decision = trade_off.decide_on(offer) if offer else None
+    if offer is None or offer.tr is None or decision is None:
+        return
+    axes.set_title(
+        f"tr = {offer.tr:.6g}, td = {offer.td:.6g}: {decision.verdict}",
+        loc="left",
+        fontsize="small",
+        color=SWITCHED,
+    )
+    start, end = trade_off.td_window
+    if start <= offer.tr <= end:
+        axes.axvline(offer.tr, color=SWITCHED, linewidth=1, linestyle=":", label="tr")
 
 
 def _draw_offers(axes: Axes, trade_off: TradeOff, values: list[float | None]) -> None:
@@ -491,7 +522,7 @@ def draw_study(answer: StudyOfRuns, *, page: bool = False) -> Figure:
             linewidth=1,
             label="_",
         )
-    if answer.common.window:
+    if answer.common.window and answer.grade != POOR:
         mark_span(
             axes, answer.common.window, "admissible in all runs", NEUTRAL, alpha=0.2
         )

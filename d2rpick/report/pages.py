@@ -282,7 +282,7 @@ def _build_verdict(answer: PairVerdict, record: page.PageContext) -> Iterator[Ma
         build_pairs(verdict.list_next_step(answer, display)),
         build_remarks(answer.cautions, further_reasons),
     )
-    yield build_explorer(record.explorer)
+    yield build_explorer(record.explorer, answer)
     caption = "Internal energy with its level at td, and the pair"
     yield _build_figure("pair-", caption, "verdict", answer, page=True)
     measures = verdict.list_known_measures(answer)

@@ -9,7 +9,11 @@ from d2rpick.base.errors import format_ranges, list_names, make_printable
 from d2rpick.choice.pair.grades import DO_NOT_USE
 from d2rpick.deck.engine_files import CAP_SHARE
 from d2rpick.report import keys, tables
-from d2rpick.report.decision import format_saved_share, list_verdict_lines
+from d2rpick.report.decision import (
+    format_saved_share,
+    is_refused,
+    list_verdict_lines,
+)
 from d2rpick.report.fields import (
     Document,
     Field,
@@ -533,7 +537,9 @@ def name_set(part_set: PartSet) -> str:
 
 def list_remarks(answer: Parts) -> list[tuple[str, str]]:
     """Return the meaning of the star and the remarks of a page, as (name, sentence) pairs."""
-    star = ("*", "the recommended set and its parts (d2rpick plan --part recommended)")
+    is_refused_set = is_refused(answer.recommended and answer.recommended.decision)
+    name = "best" if is_refused_set else "recommended"
+    star = ("*", f"the {name} set and its parts (d2rpick plan --part recommended)")
     remarks = list_page_remarks(answer)
     return [star, *remarks] if answer.recommended else remarks
 

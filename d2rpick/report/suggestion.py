@@ -13,6 +13,7 @@ from d2rpick.report.decision import (
     format_rigid_time,
     format_saving,
     format_with_number,
+    is_refused,
     list_numbered_reasons,
     list_statements,
     list_verdict_lines,
@@ -279,7 +280,8 @@ def describe_improvement(answer: PairSuggestion, better: Pair) -> str:
 def list_alternatives(answer: PairSuggestion) -> list[tuple[str, str]]:
     """Return the alternatives to the recommended pair, as (name, sentence) pairs."""
     chosen = answer.recommended.tr if answer.recommended else None
-    if answer.windows:
+    # The windows have the energy of td, but "admissible" would contradict the verdict on a pair not to be used.
+    if answer.windows and not is_refused(answer.decision):
         lines = [("admissible", describe_acceptable_windows(answer.windows, chosen))]
     else:
         lines = []
@@ -321,9 +323,7 @@ def describe_given_up_time(answer: PairSuggestion) -> str:
     times = (
         f"tr = {longer.tr:.6g}, td = {longer.td:.6g}, rigid for {longer.rigid_time:.6g}"
     )
-    shorter = (
-        f"the recommended window is {lost:.3g} ({lost / longer.rigid_time:.0%}) shorter"
-    )
+    shorter = f"the {_name_choice(answer)} window is {lost:.3g} ({lost / longer.rigid_time:.0%}) shorter"
     return f"a longer window exists ({times}), but {_explain_shorter_window(answer, longer, chosen)}; {shorter}"
 
 
@@ -345,8 +345,13 @@ def _explain_shorter_window(answer: PairSuggestion, longer: Pair, chosen: Pair) 
     bounds = longer.residual_high, chosen.residual_high
     highest, own_highest = map(format_measure, bounds)
     if (bounds[0] or 0.0) > (bounds[1] or 0.0) and highest != own_highest:
-        return f"its residual may be up to {highest}, that of the recommended window up to {own_highest}"
+        return f"its residual may be up to {highest}, that of the {_name_choice(answer)} window up to {own_highest}"
     return "its tr is less certain"
+
+
+def _name_choice(answer: PairSuggestion) -> str:
+    """Return what the choice is called: a pair that must not be used is not recommended."""
+    return "chosen" if is_refused(answer.decision) else "recommended"
 
 
 def describe_acceptable_windows(

@@ -18,6 +18,7 @@ from d2rpick.choice.td.suggest_td import STEPS
 from d2rpick.histories.digits import format_window
 from d2rpick.report.page import CLASSES, read_resource
 from d2rpick.report.tables import format_measure, format_short
+from tests.cli.test_first_lines import SWITCHED
 from tests.command import ENERGY, ROLLOVER, run
 from tests.computed import locate_stored
 
@@ -66,6 +67,22 @@ SAID = """
 const values = [...document.querySelectorAll("[data-value]")].map((one) => [one.dataset.value, one.textContent]);
 const spoken = document.querySelector(".handle").getAttribute("aria-valuetext");
 return { ...Object.fromEntries(values.reverse()), typed: document.getElementById("explorer-td").value, spoken };
+"""
+# For each share of the width, whether the energy chart has the colour of the verified pair there, to two pixels.
+HAS_VERIFIED_AT = """
+const canvas = document.querySelector(".energy canvas"), over = document.querySelector(".energy .u-over");
+const left = over.getBoundingClientRect().left - canvas.getBoundingClientRect().left;
+const text = getComputedStyle(document.querySelector("#explorer .verified")).backgroundColor;
+const [red, green, blue] = text.match(/\\d+/g).map(Number);
+const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+const columns = new Set();
+for (let i = 0; i < data.length; i += 4) {
+  if (data[i] === red && data[i + 1] === green && data[i + 2] === blue) columns.add(i / 4 % canvas.width);
+}
+return arguments[0].map((share) => {
+  const column = (left + share * over.clientWidth) * canvas.width / canvas.clientWidth;
+  return [...columns].some((one) => Math.abs(one - column) <= 2);
+});
 """
 WIDTHS = (390, 768, 1280)
 
@@ -518,12 +535,69 @@ def test_no_line_of_the_first_card_stands_again_below_its_pair(
     assert "kinetic fraction" in list_names_below(browser)
     assert not names_on_card & list_names_below(browser)
     browser.find(".handle").send_keys(Keys.ARROW_LEFT)
-    assert {"verdict", "why", "rigid for", "saves"} <= list_names_below(browser)
+    assert {"why", "rigid for", "saves"} <= list_names_below(browser)
+    assert browser.shown('.now h3 [data-value="verdict"]')
 
 
 def list_names_below(browser: Browser) -> set[str]:
     """Return the names of the visible values of the pair that is explored."""
     return {name.text for name in browser.all(".now dt") if name.is_displayed()}
+
+
+@pytest.fixture(scope="module")
+def verified(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Page of a verified pair whose tr lies before the flight."""
+    options = ("--tr", "0.1", "--td", "0.37", "--energy", "boxIE_J")
+    return write_page(tmp_path_factory.mktemp("verified"), "verify", *options, ROLLOVER)
+
+
+def test_a_verified_pair_is_marked_where_the_best_pair_is_drawn(verified: Path) -> None:
+    """The best tr for the td is another one, which the chart must not show as the verified one."""
+    data = read_content(verified)
+    assert data["verified"] == {"tr": 0.1, "td": 0.37}
+    (flight,) = data["flights"]
+    assert flight["view"][0] < 0.1 < 0.37 < flight["view"][1]
+    text = verified.read_text("utf-8")
+    assert "For comparison: the best pair for this td" in text
+    assert "the verified pair: tr and td" in text
+
+
+def test_a_page_without_a_verified_pair_marks_none(paper: Path) -> None:
+    assert "verified" not in read_content(paper)
+    assert 'class="verified"' not in paper.read_text("utf-8")
+
+
+def test_a_finished_switched_run_is_drawn_over_the_reference(tmp_path: Path) -> None:
+    """From tr to td its energy is locked in, which no energy of the reference run is for so long."""
+    page = write_page(tmp_path, *SWITCHED)
+    data = read_content(page)
+    time, energy = map(np.array, data["computed"])
+    (flight,) = data["flights"]
+    assert flight["view"][0] <= time[0] < time[-1] <= flight["view"][1]
+    tr, td = data["verified"].values()
+    locked = energy[(tr + 0.1 * (td - tr) < time) & (time < td - 0.1 * (td - tr))]
+    assert np.ptp(locked) <= 0.01 * locked.mean()
+    assert "switched run, as computed" in page.read_text("utf-8")
+
+
+@mark_for_browser
+def test_a_verdict_stands_above_the_pair_that_is_explored(
+    verified: Path, browser: Browser
+) -> None:
+    browser.open(verified)
+    badge = browser.find('.now h3 [data-value="verdict"]')
+    assert badge.get_property("textContent") == "use with care"
+    assert badge.get_attribute("class") == "badge care"
+
+
+@mark_for_browser
+def test_the_verified_tr_is_drawn_at_its_time(verified: Path, browser: Browser) -> None:
+    browser.open(verified)
+    (flight,) = read_content(verified)["flights"]
+    start, end = flight["view"]
+    shares = [(time - start) / (end - start) for time in (0.1, 0.12)]
+    drawn = browser.driver.execute_script(HAS_VERIFIED_AT, shares)
+    assert drawn == [True, False]
 
 
 @mark_for_browser

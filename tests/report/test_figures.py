@@ -14,8 +14,9 @@ from d2rpick.choice.question import Settings
 from d2rpick.choice.runs.study import Common, StudyOfRuns, StudyRow
 from d2rpick.histories.history import History
 from d2rpick.report.figures_choice import draw_study, draw_suggestion, draw_trade_off
+from d2rpick.report.formats import DisplayOptions
 from d2rpick.report.study import shorten_names
-from tests.command import BOX, ENERGY, ROOT
+from tests.command import BOX, ENERGY, MATSUM, ROOT
 from tests.energies import require
 
 SWITCHED_RUN = "switched run, as computed"
@@ -165,6 +166,27 @@ def test_what_rests_is_drawn_flat_beside_what_the_run_has() -> None:
         warnings=("at-rest",),
     )
     assert draw_study(make_study(resting)).axes[0].get_ylim()[1] == pytest.approx(43.2)
+
+
+def test_a_pair_that_must_not_be_used_is_not_called_recommended_or_admissible() -> None:
+    """Every td of the box alone is refused, whatever its energy."""
+    run = d2.read(MATSUM)
+    exploration = d2.explore(run, td_window=(0.36, 0.37), parts="box", steps=3)
+    pair = require(exploration.recommended)
+    assert require(exploration.suggestion.decision).verdict == "do not use"
+    energy, *_ = draw_trade_off(exploration).axes
+    labels = [line.get_label() for line in energy.lines]
+    assert "chosen (do not use)" in labels
+    assert "recommended" not in labels
+    assert energy.get_title(loc="left") == (
+        f"tr = {pair.tr:.6g}, td = {pair.td:.6g}: do not use"
+    )
+    suggestion = d2.suggest(run, td=pair.td, parts="box")
+    assert require(suggestion.decision).verdict == "do not use"
+    (axes,) = draw_suggestion(suggestion).axes
+    labels = [marks.get_label() for marks in (*axes.collections, *axes.patches)]
+    assert not [label for label in labels if "admissible" in str(label)]
+    assert "admissible" not in suggestion.text("table", DisplayOptions(()))
 
 
 @pytest.mark.slow
