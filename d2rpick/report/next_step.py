@@ -221,6 +221,17 @@ def add_step_to_copy(
     ]
 
 
+def ask_for_states_that_show_flight(states: int, start: float, end: float) -> str:
+    """Return the advice to write more states if those of a record are too few to show a flight; otherwise empty."""
+    # Imported here, because a card without a history needs no numpy.
+    from d2rpick.choice.pair.quality import ENOUGH_STATES
+
+    if states >= ENOUGH_STATES:
+        return ""
+    interval = (end - start) / ENOUGH_STATES
+    return f"write the states every {interval:.2g} or more often, because {states} states may miss a flight; otherwise "
+
+
 def name_lack_of_pairs(question: RepeatedQuestion) -> str:
     """Return the statement that no pair of the run can be used, with the given options that may be the reason."""
     words = (*question.times, *question.options)

@@ -11,6 +11,7 @@ from d2rpick.flight import SOURCES
 from d2rpick.flight.flight import NEVER_FLIES
 from d2rpick.report import keys, tables
 from d2rpick.report.fields import Document, Field, get_kind, many, maybe, one_of, row
+from d2rpick.report.next_step import ask_for_states_that_show_flight
 from d2rpick.report.situation import (
     list_health_columns,
     list_health_measures,
@@ -164,12 +165,25 @@ def list_overview_lines(overview: Overview) -> list[tuple[str, str]]:
             _RUN_WITHOUT_SWITCHING if overview.never_flies else _GIVE_END_OF_LOAD
         )
         cure = f"write {missing}" if missing else without_output
-        return [*lines, ("to improve", cure)]
+        return [*lines, ("to improve", f"{_ask_for_states(overview)}{cure}")]
     which = [*_list_selection_options(overview)]
     deck = ["--deck", overview.deck] if overview.deck else []
     command = ["d2rpick", "plan", *which, *deck]
     command += tables.make_positional(overview.source)
     return [*lines, ("next", tables.quote_shell_line(command))]
+
+
+def _ask_for_states(overview: Overview) -> str:
+    """Return the advice to write more states if those of the record are too few to show a flight; otherwise empty."""
+    if (
+        overview.states is None
+        or overview.time_start is None
+        or overview.time_end is None
+    ):
+        return ""
+    return ask_for_states_that_show_flight(
+        overview.states, overview.time_start, overview.time_end
+    )
 
 
 def _list_selection_options(overview: Overview) -> Iterator[str]:

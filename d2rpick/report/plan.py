@@ -28,6 +28,7 @@ from d2rpick.report.fields import (
 )
 from d2rpick.report.next_step import (
     add_step_to_copy,
+    ask_for_states_that_show_flight,
     name_lack_of_pairs,
     name_step_after_refusal,
     name_step_to_card,
@@ -452,11 +453,14 @@ def _list_step_without_window(
 
 def _name_step_without_flight(history: History, question: RepeatedQuestion) -> str:
     """Return the step if no flight is found; the end of the load is asked for unless the momentum shows no flight."""
+    more = ask_for_states_that_show_flight(
+        history.time.size, history.start, history.end
+    )
     line = write_command(question, "info")
     look = f"see with {line} what the run has to write"
     if not denies_every_flight(history):
-        return f"{look}, or give the end of the load as --after"
-    no_pair = f"{name_lack_of_pairs(question)}: {NEVER_FLIES}"
+        return f"{more}{look}, or give the end of the load as --after"
+    no_pair = f"{more}{name_lack_of_pairs(question)}: {NEVER_FLIES}"
     if any(momenta.parts for momenta in history.momenta):
         return f"{no_pair}; run it without switching"
     return f"{no_pair}; {look} to show whether single parts fly"

@@ -59,7 +59,7 @@ _BAND: Final = 0.25
 MOST_WORTH_OF_GOOD: Final = 0.01
 MOST_WORTH_OF_FAIR: Final = 0.05
 # Smallest number of states that resolve a flight; if there are fewer, a shorter output interval is proposed.
-_ENOUGH_STATES: Final = 200
+ENOUGH_STATES: Final = 200
 # More frequent output is proposed as a cure only if fewer than this number of states lie before td.
 _FEW_STATES: Final = 20
 # Largest number of parts that are named in a sentence.
@@ -543,8 +543,8 @@ def _ask_for_more_states(situation: Situation) -> Iterator[str]:
     """Yield a request for a shorter output interval if the flight has too few states up to td."""
     begin = _get_begin(situation)
     states = _count_states(situation)
-    if states < _ENOUGH_STATES and situation.td > begin:
-        interval = (situation.td - begin) / _ENOUGH_STATES
+    if states < ENOUGH_STATES and situation.td > begin:
+        interval = (situation.td - begin) / ENOUGH_STATES
         yield (
             f"write the energies every {interval:.2g} or more often, because only {states} states lie in the flight "
             "up to td"
