@@ -424,7 +424,7 @@ def _list_step_without_window(
             return []
         if not plan.flights:
             line = write_command(question, "info")
-            look = f"see with {line} what the run has to write"
+            look = f"see what the run has to write with {line}"
             return [("next", f"{look}, or give the end of the load as --after")]
         return [("next", _name_step_if_flights_are_short(question))]
     answer = max(rows, key=lambda row: row.end - row.start).answer
