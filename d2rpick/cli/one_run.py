@@ -404,8 +404,17 @@ def parts(tr: float | None, td: float | None, request: Request, output: Output) 
     with open_with_output(request, output) as (run, output):
         answer = compare_parts(run, request, tr, td)
     output.notes(run.notes, answer.cautions)
-    output.beside_answer(answer, lambda: answer.page(options.repeat_command()))
-    output.answer(answer, question=request.repeat())
+    question = request.repeat()
+
+    def write_page() -> str:
+        from d2rpick.report.pages import (
+            parts_page,  # Imported here to keep start-up fast.
+        )
+
+        return parts_page(answer, options.repeat_command(), question)
+
+    output.beside_answer(answer, write_page)
+    output.answer(answer, question=question)
     output.finish(objection=answer.recommended is None)
 
 

@@ -132,15 +132,24 @@ def study(
     answer = answer_study(request, question, sources, rows)
     output.notes((), answer.cautions)
     output.spare(dict.fromkeys(stamp.name for row in rows for stamp in row.files))
-    output.beside_answer(answer, lambda: answer.page(options.repeat_command()))
+    repeated = request.repeat()._replace(
+        times=options.write_times(td=td, td_window=td_window), files=sources
+    )
+
+    def write_page() -> str:
+        from d2rpick.report.pages import (
+            study_page,  # Imported here to keep start-up fast.
+        )
+
+        return study_page(answer, options.repeat_command(), repeated)
+
+    output.beside_answer(answer, write_page)
     output.answer(
         answer,
         lines=[write_row(row, mark) for row in rows]
         if by_line and not streaming
         else [],
-        question=request.repeat()._replace(
-            times=options.write_times(td=td, td_window=td_window), files=sources
-        ),
+        question=repeated,
     )
     _finish_study(answer, output)
 

@@ -50,6 +50,11 @@ _NEEDS_DECK: Final = (
 )
 
 
+def choose_example_id(kind: str) -> str:
+    """Return a placeholder for the ids of parts ("part") or nodes ("node") that runs as it stands."""
+    return _SOME_NODE if kind == "node" else _SOME_PART
+
+
 class NamedDeck(NamedTuple):
     """Main deck in the next command, and a hint to replace a placeholder; the hint is empty if the deck was found."""
 

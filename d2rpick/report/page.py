@@ -5,6 +5,7 @@ Shared sections are the cards of a pair, the input that was read, and how to rep
 
 from __future__ import annotations
 
+import re
 from base64 import b64encode
 from hashlib import sha256
 from html import escape
@@ -15,6 +16,7 @@ from d2rpick.base import __version__
 from d2rpick.choice.pair.grades import DO_NOT_USE, USE, USE_WITH_CARE
 from d2rpick.deck.printing import DEFAULT, SOLVERS
 from d2rpick.report.decision import list_verdict_lines
+from d2rpick.report.next_step import choose_example_id
 from d2rpick.report.situation import list_health_measures, list_situation_heading
 from d2rpick.report.tables import Cell, format_short, quote_shell_line
 
@@ -46,6 +48,12 @@ _TURNING = {*range(0x202A, 0x202F), *range(0x2066, 0x206A)}
 _CONTROLS = dict.fromkeys(
     {*range(32), *range(127, 160), *_TURNING} - {*map(ord, "\t\n")}, "\ufffd"
 )
+# What the options of a card switch, by option.
+_SWITCHED: Final = {"part": "parts", "node": "main nodes"}
+# A word of a command as `quote_shell_line` writes it.
+_WORD: Final = r"""(?:\$'(?:\\.|[^'\\])*'|'[^']*'|"[^"]*"|[^\s'"(])+"""
+# A command in a sentence, to the end of the clause.
+_COMMAND: Final = re.compile(rf"\bd2rpick(?: {_WORD}(?<![.,;:]))*(?: {_WORD})?")
 _MOST_FILES: Final = 20  # Largest number of deck files that are named on a page.
 # Labels of the lines that the reader of a page fills in by hand.
 SIGNED: Final = ("chosen by", "date", "signature")
@@ -294,6 +302,29 @@ def build_pairs(rows: Iterable[tuple[str, str]]) -> Markup:
     return make_element("dl", *listed) if listed else Markup()
 
 
+def build_steps(rows: Iterable[tuple[str, str]]) -> Markup:
+    """Return a list of names and descriptions in which each command has a line of its own, with a button to copy it.
+
+    A command ends before a hint in parentheses, or with the clause.
+
+    Examples
+    --------
+    >>> print(build_steps([("next", "look with d2rpick info 'my run.csv'. Then plan")]))
+    <dl><div><dt>next</dt><dd>look with <pre class="wrap">d2rpick info 'my run.csv'</pre>. Then plan</dd></div></dl>
+    """
+    return build_pairs((name, _mark_commands(text)) for name, text in rows)
+
+
+def _mark_commands(text: str) -> Markup:
+    pieces: list[str] = []
+    end = 0
+    for command in _COMMAND.finditer(text):
+        line = make_element("pre", command[0].rstrip(".,;:"), class_="wrap")
+        pieces += [text[end : command.start()], line]
+        end = command.start() + len(command[0].rstrip(".,;:"))
+    return join([*pieces, text[end:]])
+
+
 def _replace_markup(text: str, *, quote: bool = True) -> str:
     return escape(text, quote=quote).translate(_CONTROLS)
 
@@ -504,14 +535,19 @@ def _list_solver_input(
     solver = printing.solver or DEFAULT
     command = ["d2rpick", "card", "--tr", repr(times[0]), "--td", repr(times[1])]
     command += [] if solver == DEFAULT else ["--solver", solver]
+    kind = SOLVERS[solver].switches
+    example = choose_example_id(kind)
     line = make_element(
         "pre",
-        quote_shell_line(
-            [*command, f"--{SOLVERS[solver].switches}", "IDS", *record.judging]
-        ),
+        quote_shell_line([*command, f"--{kind}", example, *record.judging]),
         class_="wrap",
     )
-    return (make_element("p", "Printed, and judged again as printed, by"), line)
+    title = _SWITCHED[kind]
+    return (
+        make_element("p", f"Put the ids of your {title} in place of {example}."),
+        make_element("p", "Printed, and judged again as printed, by"),
+        line,
+    )
 
 
 def _build_input(situation: Situation, run: OpenedRun) -> Markup:

@@ -34,6 +34,7 @@ from d2rpick.report.page import (
     build_remarks,
     build_scrolling_table,
     build_section,
+    build_steps,
     join,
     make_element,
 )
@@ -51,7 +52,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from d2rpick.choice.answers import PairSuggestion, PairVerdict
-    from d2rpick.choice.parts.sets_of_parts import Parts, PartSet
+    from d2rpick.choice.parts.sets_of_parts import Parts
     from d2rpick.choice.switched.comparison import Comparison
     from d2rpick.choice.td.plan import PlannedFlight, RunPlan
     from d2rpick.choice.td.trade_off import Offer, TradeOff
@@ -213,7 +214,7 @@ def _build_choice(
         )
     return page.build_front(
         cards,
-        build_pairs(steps),
+        build_steps(steps),
         build_remarks(answer.cautions),
         build_pairs(suggestion.list_alternatives(answer)),
     )
@@ -279,7 +280,7 @@ def _build_verdict(answer: PairVerdict, record: page.PageContext) -> Iterator[Ma
     display = DisplayOptions(question=question, page="this page")
     yield page.build_front(
         [card],
-        build_pairs(verdict.list_next_step(answer, display)),
+        build_steps(verdict.list_next_step(answer, display)),
         build_remarks(answer.cautions, further_reasons),
     )
     yield build_explorer(record.explorer, answer)
@@ -336,7 +337,7 @@ def trade_off_page(answer: TradeOff, record: page.PageContext) -> str:
     if answer.requested:
         front = [
             page.build_front(
-                [_build_requested(answer, answer.requested)], build_pairs(steps)
+                [_build_requested(answer, answer.requested)], build_steps(steps)
             ),
             _build_choice(answer.suggestion, "If td is free: "),
         ]
@@ -419,7 +420,7 @@ def plan_page(
         page.build_front(
             cards,
             build_remarks(answer.cautions),
-            build_pairs(
+            build_steps(
                 [
                     ("plan", plan.give_plan_sentence(answer)),
                     *plan.list_next_steps(answer, question or RepeatedQuestion()),
@@ -461,8 +462,16 @@ def _build_window_card(row: PlannedFlight, answer: RunPlan) -> Markup:
     )
 
 
-def study_page(answer: StudyOfRuns, command: Sequence[str]) -> str:
-    """Write the page of ``study``; ``command`` contains the arguments that repeat it."""
+def study_page(
+    answer: StudyOfRuns,
+    command: Sequence[str],
+    question: RepeatedQuestion | None = None,
+) -> str:
+    """Write the page of ``study``; ``command`` contains the arguments that repeat it.
+
+    ``question`` has the words of the next command; without them the page names none.
+    """
+    steps = study.list_next_step(answer, question) if question else []
     caption = (
         "Internal energies of all runs, with the tr of each, the common one and td"
     )
@@ -471,6 +480,7 @@ def study_page(answer: StudyOfRuns, command: Sequence[str]) -> str:
         f"Switch times of {format_number_of_runs(len(answer.runs))}",
         page.build_front(
             [_build_common_card(answer)],
+            build_steps(steps),
             build_remarks(answer.cautions),
             build_pairs([*_list_below_card(answer), *study.list_run_reasons(answer)]),
         ),
@@ -539,8 +549,16 @@ def _list_input_files(answer: StudyOfRuns) -> str:
     )
 
 
-def parts_page(answer: Parts, command: Sequence[str]) -> str:
-    """Write the page of ``parts``; ``command`` contains the arguments that repeat the answer."""
+def parts_page(
+    answer: Parts,
+    command: Sequence[str],
+    question: RepeatedQuestion | None = None,
+) -> str:
+    """Write the page of ``parts``; ``command`` contains the arguments that repeat the answer.
+
+    ``question`` has the words of the next command; without them the page names none.
+    """
+    steps = parts.list_next_step(answer, question) if question else []
     if answer.sets:
         sets = [
             build_section(
@@ -564,7 +582,9 @@ def parts_page(answer: Parts, command: Sequence[str]) -> str:
     return build_document(
         f"Parts to switch: {page.get_title(answer.files)}",
         page.build_front(
-            [_build_set_card(answer.recommended)], build_remarks(answer.cautions)
+            [_build_set_card(answer)],
+            build_steps(steps),
+            build_remarks(answer.cautions),
         ),
         *sets,
         *(
@@ -588,9 +608,10 @@ def parts_page(answer: Parts, command: Sequence[str]) -> str:
     )
 
 
-def _build_set_card(best: PartSet | None) -> Markup:
+def _build_set_card(answer: Parts) -> Markup:
+    best = answer.recommended
     if best is None:
-        return page.build_refusal("No set of parts can be recommended.")
+        return _build_card_without_set(answer)
     saved = make_element(
         "span",
         make_element("i", "saves about"),
@@ -614,6 +635,17 @@ def _build_set_card(best: PartSet | None) -> Markup:
         why,
         class_=class_,
     )
+
+
+def _build_card_without_set(answer: Parts) -> Markup:
+    """Return the card that says, as the terminal does, that no part is known to be suitable, and why."""
+    lines = build_pairs(parts.list_verdict_on_set(answer))
+    if answer.inventory is None:
+        title, class_ = "unknown", "card"
+    else:
+        title, class_ = "nothing to use", "card refused"
+    badge = make_element("span", title, class_=class_.replace("card", "badge"))
+    return make_element("div", make_element("h2", badge), lines, class_=class_)
 
 
 def drive_page(answer: Driven, command: Sequence[str]) -> str:

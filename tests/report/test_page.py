@@ -16,8 +16,8 @@ import pytest
 
 from d2rpick.api.request import OPTIONS
 from d2rpick.cli import one_run
-from d2rpick.report.page import read_resource
-from tests.command import ENERGY, GLSTAT, ROOT, make_replay_file, put, run
+from d2rpick.report.page import build_steps, read_resource
+from tests.command import ENERGY, GLSTAT, MATSUM, ROOT, make_replay_file, put, run
 from tests.computed import locate_stored, read_unpacked
 
 ROLLOVER_T01 = str(ROOT / "sample_data" / "rolloverT01.gz")
@@ -413,7 +413,7 @@ def test_the_command_for_the_card_reads_and_judges_as_the_choice_was(
     ).last_command()
     assert words[5:] == [
         "--part",
-        "IDS",
+        "1",
         "--history",
         source,
         *options[:2],
@@ -421,7 +421,7 @@ def test_the_command_for_the_card_reads_and_judges_as_the_choice_was(
         *options[2:6],
         *options[6:],
     ]
-    assert run(*("7" if word == "IDS" else word for word in words)).exit_code == 0
+    assert run(*words).exit_code == 0  # as it stands
 
 
 @pytest.mark.slow
@@ -437,7 +437,7 @@ def test_the_command_for_radioss_names_the_parts(tmp_path: Path) -> None:
         "--part",
         "box",
     ]
-    assert run(*("1001" if word == "IDS" else word for word in words)).exit_code == 0
+    assert run(*words).exit_code == 0  # as it stands
 
 
 @pytest.mark.slow
@@ -544,3 +544,50 @@ def test_a_verdict_tells_health_parts_and_the_switched_run(tmp_path: Path) -> No
     )
     for text in (*texts, "66% of that of the reference run"):
         assert text in page.text
+
+
+@pytest.mark.parametrize(
+    ("sentence", "commands"),
+    [
+        ("see d2rpick info a.csv", ["d2rpick info a.csv"]),
+        ("use d2rpick info 'a b.csv' (the run). Then stop", ["d2rpick info 'a b.csv'"]),
+        ("d2rpick info a.csv, or give --after", ["d2rpick info a.csv"]),
+        ("first d2rpick plan --part 1,2 a.k; or none", ["d2rpick plan --part 1,2 a.k"]),
+        ("use the results of the switched run", []),
+    ],
+)
+def test_each_command_of_a_next_step_can_be_copied(
+    sentence: str, commands: list[str]
+) -> None:
+    """Whatever words surround it, exactly the command stands in the element with a button."""
+    step = build_steps([("next", sentence)])
+    assert re.findall('<pre class="wrap">(.*?)</pre>', step) == commands
+    assert sentence in re.sub("<.*?>", "", step)
+
+
+def test_the_page_of_a_study_names_the_next_command_as_the_terminal_does(
+    tmp_path: Path,
+) -> None:
+    page = tmp_path / "page.html"
+    text = run("study", "--td", "0.064", "--report", str(page), ENERGY, ENERGY).stdout
+    (command,) = re.findall(
+        '<dt>next</dt><dd>.*?<pre class="wrap">(.*?)</pre>', page.read_text()
+    )
+    assert f" {command}" in " ".join(text.split())
+
+
+def test_the_page_of_parts_without_a_deck_says_what_the_terminal_says(
+    tmp_path: Path,
+) -> None:
+    """Unknown is not "nothing to use"."""
+    page = tmp_path / "page.html"
+    text = run("parts", "--no-deck", "--report", str(page), MATSUM).stdout
+    written = re.sub("<.*?>", " ", page.read_text("utf-8").split("<main>")[1])
+    shown = " ".join(html.unescape(written).split())
+    assert "nothing to use" not in shown
+    for part in (
+        "unknown: without the deck of the run no part can be judged",
+        "judge the parts with",
+    ):
+        assert part in shown
+        assert part in " ".join(text.split())
