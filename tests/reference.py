@@ -164,7 +164,7 @@ def link_rules(text: str) -> str:
 
 def json_page() -> str:
     """Write the page of the keys in JSON, from the schemas that ship."""
-    lines = ["# Keys of JSON", "", _JSON_INTRODUCTION]
+    lines = ["# JSON keys", "", _JSON_INTRODUCTION]
     for path in sorted(SCHEMAS.glob("*.json")):
         schema = json.loads(path.read_text("utf-8"))
         lines += ["", f"## {path.stem.rpartition('-')[0]}", ""]

@@ -25,7 +25,10 @@ if TYPE_CHECKING:
     from d2rpick.choice.pair.decision import Decision
     from d2rpick.deck.printed_card import PrintedCard, Printing
 
-_ONLY_JUDGED: Final = "`parts` selects the parts whose energy judges a card for {}; give a `run` with parts"
+_ONLY_JUDGED: Final = (
+    "a card for {} switches the rigid bodies of `node`; `parts` only selects the energy by which it is judged, so omit "
+    "it, or give a `run` with parts"
+)
 
 
 class JudgedCard(NamedTuple):

@@ -19,6 +19,9 @@ _MOST_NAMED: Final = 20  # Largest number of names that one message lists.
 # Code of the warning that a bug in the program caused an input to be skipped.
 INTERNAL_ERROR: Final = "internal-error"
 
+# Advice for a file that ends within a state.
+COPY_AGAIN: Final = "copy the file again, or let the run finish"
+
 
 class D2RPickError(Exception):
     """Base class of all errors of d2rpick; its text is one line, ready to be shown to a user."""

@@ -712,16 +712,21 @@ def suggest_in_run(
         answer = suggest_at(situation, with_better=with_better)
         if with_better:
             answer = _add_choice_in_flight(answer)
-    _refuse_switched(answer.situation)
+    _refuse_switched(reference, answer.situation)
     return _add_health(answer, reference.run)
 
 
-def _refuse_switched(situation: Situation) -> None:
-    """Raise RangeError if the parts were rigid in the flight up to td."""
+def _refuse_switched(reference: Reference, situation: Situation) -> None:
+    """Raise RangeError if the parts, or some of them, were rigid in the flight up to td."""
     # Imported here to keep start-up fast.
     from d2rpick.choice.switched.frozen import refuse_switched
 
-    refuse_switched(situation.history, situation.flight.start, situation.td)
+    start, td = situation.flight.start, situation.td
+    refuse_switched(situation.history, start, td)
+    if reference.run.parts:
+        from d2rpick.choice.switched.switched_run import refuse_partly_rigid
+
+        refuse_partly_rigid(reference, start, td)
 
 
 def _add_choice_in_flight(answer: PairSuggestion) -> PairSuggestion:
@@ -751,7 +756,7 @@ def verify_run(
     """Judge one pair (tr, td) of a reference run; see `verify_in_history` for ``earlier`` and the errors raised."""
     refuse_unsound(reference.history, settings, td, choosing=False)
     verdict = verify_in_history(reference.history, tr, td, settings, earlier)
-    _refuse_switched(verdict.situation)
+    _refuse_switched(reference, verdict.situation)
     return _add_health(verdict, reference.run)
 
 

@@ -106,7 +106,8 @@ class ChoiceOptions:
         metadata=_describe_use(of_cards=True),
     )
     landing: float | None = make_option(
-        "Time of the next contact after the flight; td lies one margin before it.  [default: found from the record]",
+        "Time of the next contact after the flight; td lies at least one margin before it.  "
+        "[default: found from the record]",
         TIME,
         "T",
         metadata=_describe_use(of_cards=True),
@@ -163,7 +164,7 @@ class ChoiceOptions:
         metadata=_describe_use(of_cards=True, of_sets=False),
     )
     cost_share: float | None = make_option(
-        "Fraction of the CPU time of a time step spent on the elements of the switched parts, to predict the saving.",
+        "Fraction of the CPU time of a time step that is saved while the parts are rigid, to predict the saving.",
         FRACTION,
         "C",
         metadata=_describe_use(of_sets=False, is_advanced=True),

@@ -33,6 +33,7 @@ from d2rpick.choice.switched.switched_run import (
     select_model_momenta,
 )
 from d2rpick.choice.td.flights import find_flights
+from d2rpick.flight.flight import denies_every_flight
 from d2rpick.flight.margin import LEAST_MARGIN
 from d2rpick.flight.momentum import replace_words_by_part_ids
 from d2rpick.flight.window import FreeFlight
@@ -91,7 +92,7 @@ class Overview(NamedTuple):
     states why no times can be chosen from the run; empty if they can.  ``should_write`` names the output that would
     show the flights of single parts; None if it is written, or there is no state.  ``deck`` is the main deck of the run
     that was used, and ``selection`` the columns and parts that the user chose.  ``rigid`` are the windows in which
-    parts are rigid.
+    parts are rigid.  ``never_flies`` is True if the momentum shows no flight at any time.
     """
 
     source: tuple[str, ...]
@@ -116,6 +117,7 @@ class Overview(NamedTuple):
     deck: str | None = None
     selection: Selection = Selection()
     rigid: tuple[Times, ...] = ()
+    never_flies: bool = False
 
     @property
     def verdict(self) -> str:
@@ -132,6 +134,8 @@ class Overview(NamedTuple):
         if not self.flights and self.states is not None and self.states < _FEWEST:
             states = f"{self.states} state{'s' * (self.states != 1)}"
             return f"the files contain {states}, at least {_FEWEST} were expected"
+        if not self.flights and not self.complete:
+            return "the files end within a state, and no free flight is found in the part that was read"
         if not self.flights:
             return "no free flight is found, so nothing can be made rigid"
         if self._is_spent:
@@ -267,6 +271,7 @@ def describe_run(
         deck=deck,
         selection=selection,
         rigid=rigid,
+        never_flies=history is not None and denies_every_flight(history),
     )
 
 

@@ -71,6 +71,7 @@ class Settings(ChoiceOptions):
     them, and one body is then assumed. ``placement`` contains the part positions according to the deck, or None.
     ``by_deck`` names the files from which these values, and a cost share that the user did not give, were computed;
     None if there is no deck. ``kept_off`` contains the main nodes of rigid bodies that a Radioss deck keeps inactive.
+    ``kept_deformable`` contains the parts that the deck does not allow to become rigid, such as springs.
     ``ruined`` lists faults of the deck that ruin its run.
     """
 
@@ -82,6 +83,7 @@ class Settings(ChoiceOptions):
     placement: Placement | None = field(default=None, compare=False, repr=False)
     by_deck: ByDeck | None = field(default=None, compare=False, repr=False)
     kept_off: tuple[int, ...] = field(default=(), compare=False, repr=False)
+    kept_deformable: tuple[int, ...] = field(default=(), compare=False, repr=False)
     ruined: tuple[str, ...] = field(default=(), compare=False, repr=False)
 
     def run_time_share(self, rigid_fraction: float) -> float | None:

@@ -220,7 +220,7 @@ def _finish_answer(
 
 @options.make_command
 @options.make_time_option(
-    "--td", "Time to switch back with which the others are compared."
+    "--td", "Switch-back time with which all other times are compared."
 )
 @options.make_time_option(
     "--td-window",
@@ -318,7 +318,7 @@ def verify(
     cards: Cards,
     output: Output,
 ) -> None:
-    """Judge one pair of switch times against the HISTORY of a run without switching.
+    """Judge one pair of switch times by the HISTORY of the reference run.
 
     Examples
     --------

@@ -171,7 +171,7 @@ def _plan(driving: Driving) -> list[str]:
 )
 @click.option(
     "--for", "lasting", type=choose_click_type(NOT_NEGATIVE), metavar="T", cls=options.Either, instead_of=("once",),
-    help="Number of seconds after which to end.  [default: when the run has ended]",
+    help="Stop watching after this number of seconds.  [default: when the run has ended]",
 )  # fmt: skip
 @options.add_options(
     *("part", "deck", "output_format", "exit_zero", "quiet"),
@@ -186,7 +186,7 @@ def follow(
     request: Request,
     output: Output,
 ) -> None:
-    """Watch RUN, files or a folder, while it is computed: report when it flies, and when to switch.
+    """Watch RUN, files or a folder, while it is computed: report when the parts fly, and when to switch.
 
     d2rpick prints a line for each event: load, flight with its evidence, recommended switch, contact, restart, silence,
     end.  RUN need not have started.  d2rpick does not start, stop or change anything.

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 # Number of bytes from which a deck is recognised; titles and comments may precede its first keyword.
 _HEAD = 64 * 1024
+# Ends of the names of packed decks, which neither solver nor d2rpick reads.
+_PACKED_DECKS = tuple(f".{suffix}.gz" for suffix in ("k", "key", "dyn", "rad"))
 
 
 def read_inventory(path: str) -> Inventory:
@@ -47,7 +49,8 @@ def read_inventory(path: str) -> Inventory:
     else:
         inventory = ls_dyna_inventory.read_ls_dyna_inventory(read_deck(path))
     if not inventory.parts:
-        why = f" ({inventory.notes[0]})" if inventory.notes else ""
+        is_explained = inventory.notes and not inventory.complete
+        why = f" ({inventory.notes[0]})" if is_explained else ""
         raise DeckError(
             f"{path}: no parts were found{why}; give the main deck of the run"
         )
@@ -75,30 +78,33 @@ def find_time_unit(path: str) -> str:
     return of_deck if of_deck == of_run else ""
 
 
-def find_main_decks(folder: str) -> list[str]:
+def find_main_decks(folder: str, cure: str = "give the deck itself") -> list[str]:
     """Return the paths of the main decks in a folder and its subfolders.
 
     A main deck contains ``*KEYWORD`` (LS-DYNA) or ``/BEGIN`` (Radioss) near its beginning, and no other deck of the
-    folder includes it. Hidden files and folders are ignored.
+    folder includes it. Hidden files and folders are ignored. ``cure`` is the advice if there is no deck at all.
 
     Raises
     ------
     DeckError
         If there is no main deck; the message says what to do.
     """
-    decks = [path for path in _list_files(folder) if _is_main_deck(path)]
+    files = [*_list_files(folder)]
+    decks = [path for path in files if _is_main_deck(path)]
     included = {
         os.path.realpath(path) for deck in decks for path in _list_includes(deck)
     }
     main_paths = [path for path in decks if os.path.realpath(path) not in included]
     if not main_paths:
+        packed = next(filter(_is_packed_deck, files), None)
         if decks:
             reason = "each deck is included by another one"
+        elif packed:
+            reason = f"{packed} is packed"
+            cure = "unpack it, for example with gunzip"
         else:
             reason = "no file with *KEYWORD or /BEGIN"
-        raise DeckError(
-            f"{folder}: no main deck in this folder ({reason}); give the deck itself"
-        )
+        raise DeckError(f"{folder}: no main deck in this folder ({reason}); {cure}")
     return main_paths
 
 
@@ -118,6 +124,11 @@ def find_decks_of_run(folder: str) -> list[str]:
         if os.path.samefile(os.path.dirname(path) or os.curdir, folder)  # noqa: PTH120, PTH121  pathlib would slow down start-up
         and _has_parts(path)
     ]
+
+
+def _is_packed_deck(path: str) -> bool:
+    """Return True if the name is that of a packed deck, such as ``CAR_0000.rad.gz``."""
+    return path.lower().endswith(_PACKED_DECKS)
 
 
 def _has_parts(path: str) -> bool:

@@ -82,7 +82,7 @@ _PUSHES, _OF_GRAVITY = ("LOAD_", "AIRBAG_"), ("LOAD_BODY", "LOAD_GRAVITY")
 _OFFSET_THICKNESSES: Final = 2
 
 
-class FirstRun(NamedTuple):
+class FirstRunDeck(NamedTuple):
     """A deck whose first run is to switch parts, and when it switches them.
 
     Attributes
@@ -118,7 +118,7 @@ class FirstRun(NamedTuple):
         return self.after is None and has_gravity and not starts_moving
 
 
-def print_first_run_cards(first_run: FirstRun) -> PrintedCard:
+def print_first_run_cards(first_run: FirstRunDeck) -> PrintedCard:
     """Print the cards with which the first run of a deck switches its parts after the given force-free time.
 
     Returns
@@ -139,7 +139,7 @@ def print_first_run_cards(first_run: FirstRun) -> PrintedCard:
 # The functions below write the cards for Radioss.
 
 
-def _print_radioss_cards(first_run: FirstRun) -> PrintedCard:
+def _print_radioss_cards(first_run: FirstRunDeck) -> PrintedCard:
     """Print the engine files and sensors of a Radioss run; raise DeckError if the deck has no contact or rigid wall."""
     path, wait = first_run.path, first_run.wait
     run = read_run(path)
@@ -185,7 +185,7 @@ def _print_radioss_cards(first_run: FirstRun) -> PrintedCard:
 # The functions below write the cards for LS-DYNA.
 
 
-def _print_ls_dyna_cards(first_run: FirstRun) -> PrintedCard:
+def _print_ls_dyna_cards(first_run: FirstRunDeck) -> PrintedCard:
     """Print the switch sets of an LS-DYNA run; raise DeckError unless exactly one contact can trigger the switches."""
     path, wait, after = first_run.path, first_run.wait, first_run.after
     deck = read_deck(path)

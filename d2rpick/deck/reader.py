@@ -322,7 +322,7 @@ def read_deck(path: str, content: bytes | SourceFile | None = None) -> Deck:
             problem = "no keyword was found"
             expected = "an LS-DYNA deck (lines that begin with *) or a file of a Radioss run (/BEGIN, /RUN)"
         raise DeckError(
-            f"{path}: {problem}; {expected} {'were' if main.marks else 'was'} expected"
+            f"{path}: {problem}; {expected} {'were' if main.marks else 'was'} expected; give the main deck of the run"
         )
     _Reader(deck).read(main, _Context(deck.scope))
     return deck

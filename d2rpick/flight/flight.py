@@ -30,6 +30,8 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Balance, History, Momenta, Samples
     from d2rpick.histories.names import Part
 
+# Why no flight is found, if the momentum excludes every flight.
+NEVER_FLIES: Final = "the momentum shows no free flight at any time"
 _SURE: Final = ("given", "momentum", "oscillator")
 BY_ENERGIES: Final = ("contact-energy", "energy-balance")
 # Largest work of a load on the parts in a flight, relative to their internal energy [-].
@@ -275,6 +277,14 @@ def find_all_seen(history: History) -> tuple[tuple[str, FreeFlight], ...]:
         if flights or witness.decisive:
             return tuple(confirmed_flights)
     return ()
+
+
+def denies_every_flight(history: History) -> bool:
+    """Return True if the momentum shows that the parts, or the model, fly at no time of the record."""
+    return any(
+        witness.source == "momentum" and witness.decisive and not witness.flights()
+        for witness in list_witnesses(history)
+    )
 
 
 def _can_deny(witness: Witness, flight: FreeFlight) -> bool:

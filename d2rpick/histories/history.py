@@ -240,7 +240,8 @@ class Given:
     contains the energies of the whole model; None if only the internal energy is written. ``masses`` contains those of
     the parts with known momenta, in the order of the parts; a value is NaN if it is unknown, and all are None if no
     mass is known. ``forces`` contains those of contacts and rigid walls. ``not_chosen`` contains the parts that a table
-    names as not included in its internal energy. ``written`` contains all data of a switched run whose part data are
+    names as not included in its internal energy. ``springs`` contains the springs and dampers of the run, whose energy
+    is left out of a sum of part energies. ``written`` contains all data of a switched run whose part data are
     not used, because the parts were rigid at some time.
     """
 
@@ -249,6 +250,7 @@ class Given:
     masses: Samples | None = None
     forces: tuple[ContactForce, ...] = ()
     not_chosen: tuple[Part, ...] = ()
+    springs: tuple[Part, ...] = ()
     written: Given | None = None
 
     def internal_energies(self, parts: Sequence[Part]) -> Track | None:  # noqa: ARG002  subclasses use the argument

@@ -17,7 +17,13 @@ from d2rpick.histories.database import Database, Legs
 from d2rpick.histories.formats import FAMILIES, READERS
 from d2rpick.histories.names import Selection
 from d2rpick.histories.run import OpenedRun
-from d2rpick.histories.source import Source, list_tables_of_folder, open_files
+from d2rpick.histories.source import (
+    Source,
+    find_later_legs,
+    has_next_leg,
+    list_tables_of_folder,
+    open_files,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -95,8 +101,10 @@ def open_run(
         If a file cannot be read as an energy history, if companions have no time in common, or if one of several files
         was replaced while they were opened.
     """
-    notes = _note_unused_tables(names)
-    return open_sources(open_files(names), selection, input_format, notes)
+    sources = open_files(names)
+    files = [source.name for source in sources]
+    notes = (*_note_unused_tables(names), *_note_unread_legs(files))
+    return open_sources(sources, selection, input_format, notes)
 
 
 def _note_unused_tables(names: Sequence[str]) -> tuple[str, ...]:
@@ -109,6 +117,24 @@ def _note_unused_tables(names: Sequence[str]) -> tuple[str, ...]:
         return (_note_left_out_table(listed),)
     return (
         f"{listed} were left out: tables next to databases of the solver; name one to use it",
+    )
+
+
+def _note_unread_legs(files: Sequence[str]) -> tuple[str, ...]:
+    """Return a note on the later restart segments of a Radioss run that lie next to its files but were not read."""
+    continued = [file for file in files if has_next_leg(file)]
+    if not continued:
+        return ()
+    unread = [leg for leg in find_later_legs(continued) if leg not in files]
+    if not unread:
+        return ()
+    listed = list_names(unread, most=_MOST_TABLES)
+    if len(unread) == 1:
+        return (
+            f"{listed} in the same folder was not read; if it is a later restart segment of the run, name it too",
+        )
+    return (
+        f"{listed} in the same folder were not read; if they are later restart segments of the run, name them too",
     )
 
 

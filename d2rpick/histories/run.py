@@ -530,6 +530,11 @@ class _Written(Given):
         return self._run.contact_forces
 
     @cached_property
+    def springs(self) -> tuple[Part, ...]:
+        """Springs and dampers of the run, judging by their energies."""
+        return self._run.springs
+
+    @cached_property
     def not_chosen(self) -> tuple[Part, ...]:
         """Parts whose energies a table lists separately, because its internal energy does not include them."""
         database = self._find_table_with_others()

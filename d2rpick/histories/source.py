@@ -37,6 +37,8 @@ _HEAD_OF_TABLE: Final = 4096
 # Suffixes of decks. A folder with decks but no databases belongs to a run that has not been computed yet.
 _DECKS: Final = (".k", ".key", ".dyn", ".rad")
 
+# Pattern of the name of a Radioss history, whose last two digits are the number of its restart segment.
+_RADIOSS_LEG: Final = re.compile(r"(.*T)(\d\d)(?:\.gz)?", re.DOTALL)
 # Pattern of a file name with or without the number of a restart segment (e.g. runT01, binout0001).
 _NUMBERED: Final = re.compile(r"(.*?)(\d*)(\.gz)?", re.DOTALL)
 
@@ -368,6 +370,15 @@ def _unpack_pieces(
                 raise FormatError(f"{name}: its packed data become {too_much}")
             unread = unpacker.unused_data
     return pieces, not unpacker.eof
+
+
+def has_next_leg(name: str) -> bool:
+    """Return True if the file is a T01, T02, ... of Radioss and the file with the next number is in its folder."""
+    match = _RADIOSS_LEG.fullmatch(name)
+    if match is None:
+        return False
+    successor = f"{match[1]}{int(match[2]) + 1:02d}"
+    return any(os.path.isfile(f"{successor}{suffix}") for suffix in ("", ".gz"))  # noqa: PTH113  pathlib would slow down start-up
 
 
 def find_later_legs(names: Sequence[str]) -> list[str]:

@@ -87,7 +87,7 @@ def list_verdict_lines(
     covered = [
         name for name in calibration.weights.per_element if name not in _IN_WORDS
     ]
-    others = "the saving of parts with any other formulation stays unknown with them"
+    others = "any other formulation keeps its built-in weight, scaled to these"
     lines.append(("covers", f"{list_names(covered)}; {others}"))
     line = write_command(question, "calibrate", "-f", "toml", "-o", _FILE)
     step = f"write the weights with {line}, then give plan or parts --weights {_FILE}"

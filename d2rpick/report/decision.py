@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.pair.candidates import Candidate
     from d2rpick.choice.pair.decision import Decision
     from d2rpick.choice.pair.quality import Grade
+    from d2rpick.histories.history import History
 
     Lines = list[tuple[str, str]]
 
@@ -127,9 +128,16 @@ def format_outlook(decision: Decision) -> str:
     return f"To improve: {decision.cure}. {expectation}"
 
 
-def format_rigid_time(best: Candidate) -> str:
+def format_rigid_time(best: Candidate, history: History) -> str:
     """Format the time for which the parts are rigid."""
-    return f"{best.rigid_time:.6g}, {best.rigid_fraction:.0%} of the simulated time"
+    share = format_rigid_share(best.rigid_fraction, history)
+    return f"{best.rigid_time:.6g}, {share}"
+
+
+def format_rigid_share(fraction: float, history: History) -> str:
+    """Format a rigid time as a ``fraction`` of the simulated time, or of the record if its file is cut [-]."""
+    whole = "the simulated time" if history.complete else "the record that was read"
+    return f"{fraction:.0%} of {whole}"
 
 
 def format_accuracy(best: Candidate) -> str:

@@ -51,10 +51,11 @@ def describe_news(
     ``names`` are the files of the run, ``parts`` the chosen parts.
     """
     selected = ("--part", ",".join(parts)) if parts else ()
-    plan = quote_shell_line(("d2rpick", "plan", *selected, *make_positional(names)))
     nothing_read = News()
-    news, is_over = nothing_read, False
+    news, is_over, plan = nothing_read, False, ""
     for news_before, news in pairwise(chain([nothing_read], reads)):
+        files = make_positional((*names, *news.later_files))
+        plan = quote_shell_line(("d2rpick", "plan", *selected, *files))
         if news.now != news_before.now:
             is_over = False
         if news.ending or news.silence:

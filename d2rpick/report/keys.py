@@ -120,8 +120,8 @@ _POSITION: Final = (
     Field("position_error_assumes", "text?",
           "assumption about the rigid bodies, because there is no deck; null with a deck"),
     Field("position_error_is_lower_bound", "flag?",
-          "true if the position error may be larger: an internal motion that is slower than the flight, or that bends "
-          "the body, looks like a rotation; null if unknown", later=True),
+          "true if the position error may be larger, because an internal motion with a period longer than the flight, "
+          "or bending of the body, looks like a rotation; null if unknown", later=True),
 )  # fmt: skip
 # All values of a candidate. New values are added at the end, so that the CSV columns keep their order.
 CANDIDATE: Final = row(
@@ -314,8 +314,8 @@ HEALTH: Final = Field("health", maybe(row(
     Field("window_reason", "text?", "reason why the work in the window is not judged"),
     Field("until", "number?", "time up to which the run was checked: td, or the end of the run for info"),
     name="health", later=("part_hourglass_share", "part", "until"),
-)), "health of the reference run up to td; energies relative to the peak internal energy of the model, null if the "
-    "files do not contain them")  # fmt: skip
+)), "health of the reference run up to td, in info of the whole record; energies relative to the peak internal "
+    "energy of the model, null if the files do not contain them")  # fmt: skip
 
 
 class Read(Protocol):
@@ -410,7 +410,7 @@ MECHANICS: Final = row(
     Field("energy_td", "number", "internal energy at td"),
     Field("kinetic_share", maybe(SHARE), "kinetic fraction K: fraction of the vibration energy that is kinetic at td"),
     Field("kinetic_share_estimated", "flag",
-          "true if kinetic_share comes from the modes of the structure or from counted cycles, not from an oscillator",
+          "true if kinetic_share is estimated from counted cycles, not computed with a vibration model",
           lambda now: now.vibration.estimated is not None),
     Field("basis", BASIS, "model of the vibration on which the choice is based"),
     Field("flight", FLIGHT, "free flight"),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from d2rpick.base.errors import list_names
+from d2rpick.base.errors import COPY_AGAIN, list_names
 from d2rpick.choice.pair.grades import DO_NOT_USE
 from d2rpick.deck.beside import find_deck_beside
 from d2rpick.report.tables import make_positional, quote_shell_line
@@ -206,6 +206,26 @@ def _name_step_to_better_record(decision: Decision, question: RepeatedQuestion) 
     return f"improve the record: {decision.cure}; no pair of it can be used before"
 
 
+def add_step_to_copy(
+    history: History, steps: Sequence[tuple[str, str]]
+) -> list[tuple[str, str]]:
+    """Return the next steps; if the files end within a state, the first one is to copy them again.
+
+    The line before it says that the verdict is that of the part that was read.
+    """
+    if history.complete:
+        return [*steps]
+    end = f"the record ends early, at {history.end:.6g}, within a state"
+    rest = "; ".join(step for _, step in steps)
+    return [
+        ("note", f"{end}: only the part before was read and judged"),
+        (
+            "next",
+            f"{COPY_AGAIN}{f'. For the part that was read: {rest}' if rest else ''}",
+        ),
+    ]
+
+
 def name_lack_of_pairs(question: RepeatedQuestion) -> str:
     """Return the statement that no pair of the run can be used, with the given options that may be the reason."""
     words = (*question.times, *question.options)
@@ -261,7 +281,7 @@ def name_step_after_refusal(
         return f"choose both times in the flight with {line}"
     if better is not None:
         return name_step_to_better_pair(better, question)
-    missing = situation.together.not_chosen.parts if question.parts else ()
+    missing = situation.parts_to_add if question.parts else ()
     if missing:
         parts = (*(situation.history.parts or ()), *missing)
         ids = sorted(part.id for part in parts)

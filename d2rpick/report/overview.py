@@ -5,9 +5,10 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Final
 
-from d2rpick.base.errors import list_names, make_printable
+from d2rpick.base.errors import COPY_AGAIN, list_names, make_printable
 from d2rpick.choice.pair.grades import DO_NOT_USE, USE, USE_WITH_CARE
 from d2rpick.flight import SOURCES
+from d2rpick.flight.flight import NEVER_FLIES
 from d2rpick.report import keys, tables
 from d2rpick.report.fields import Document, Field, get_kind, many, maybe, one_of, row
 from d2rpick.report.situation import (
@@ -102,6 +103,8 @@ _RECORD: Final = {
 }
 # Advice if momenta are written but show no flight.
 _GIVE_END_OF_LOAD: Final = "if you know that the parts fly after a load, give its end to d2rpick plan with --after"
+# Advice if the momenta that are written exclude every flight.
+_RUN_WITHOUT_SWITCHING: Final = f"{NEVER_FLIES}: run it without switching"
 # Advice if a load of unknown kind acts in every flight.
 _EXPLAIN_LOAD: Final = (
     "write the mass and the part momenta (LS-DYNA matsum, Radioss /TH/PART), or give the deck of the run as `deck`, "
@@ -154,8 +157,13 @@ def list_overview_lines(overview: Overview) -> list[tuple[str, str]]:
             return lines
         if overview.is_loaded:
             return [*lines, ("to improve", _EXPLAIN_LOAD)]
+        if not overview.complete:
+            return [*lines, ("to improve", COPY_AGAIN)]
         missing = overview.should_write
-        cure = f"write {missing}" if missing else _GIVE_END_OF_LOAD
+        without_output = (
+            _RUN_WITHOUT_SWITCHING if overview.never_flies else _GIVE_END_OF_LOAD
+        )
+        cure = f"write {missing}" if missing else without_output
         return [*lines, ("to improve", cure)]
     which = [*_list_selection_options(overview)]
     deck = ["--deck", overview.deck] if overview.deck else []

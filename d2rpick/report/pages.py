@@ -268,7 +268,7 @@ def _build_verdict(answer: PairVerdict, record: page.PageContext) -> Iterator[Ma
         times,
         situation.history,
         [
-            *map(verdict.list_comparison_verdict, filter(None, [answer.switched])),
+            *verdict.list_comparison(answer),
             *verdict.list_pair_evidence(answer),
         ],
     )
@@ -409,7 +409,7 @@ def plan_page(
     """
     cards = [_build_window_card(row, answer) for row in answer.supported]
     cards = cards or [page.build_refusal("No window of this run can be recommended.")]
-    caption = "Internal energy with the flights, and below it the rigid windows with their numbers"
+    caption = "Internal energy with the flights, and above it the rigid windows with their numbers"
     files = [
         *page.list_digests(run.files),
         *page.list_digests_of_settings(answer.settings),
@@ -453,7 +453,7 @@ def _build_window_card(row: PlannedFlight, answer: RunPlan) -> Markup:
     assert row.candidate is not None
     assert row.decision is not None
     facts = [
-        ("rigid for", format_rigid_time(row.candidate)),
+        ("rigid for", format_rigid_time(row.candidate, answer.history)),
         *list_statements(row.decision),
     ]
     title = f"Flight {row.number}: "

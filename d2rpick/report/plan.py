@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING, Any, Final
 from d2rpick.base.errors import list_names, make_printable
 from d2rpick.choice.pair.grades import DO_NOT_USE, GOOD, USE, USE_WITH_CARE
 from d2rpick.choice.td.plan import TOO_SHORT
+from d2rpick.flight.flight import NEVER_FLIES, denies_every_flight
 from d2rpick.report import keys, tables
 from d2rpick.report.decision import (
     format_in_full,
     format_outlook,
+    format_rigid_share,
     format_saved_share,
 )
 from d2rpick.report.fields import (
@@ -25,6 +27,7 @@ from d2rpick.report.fields import (
     write_csv,
 )
 from d2rpick.report.next_step import (
+    add_step_to_copy,
     name_lack_of_pairs,
     name_step_after_refusal,
     name_step_to_card,
@@ -42,6 +45,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.pair.decision import Decision
     from d2rpick.choice.pair.situation import Situation
     from d2rpick.choice.td.plan import PlannedFlight, RunPlan
+    from d2rpick.histories.history import History
     from d2rpick.report.formats import DisplayOptions, RepeatedQuestion, WrittenDeck
 
 
@@ -279,7 +283,7 @@ def give_plan_sentence(plan: RunPlan) -> str:
         "from {:.6g} to {:.6g}".format(*window) for window in plan.windows
     )
     use = _describe_use(plan)
-    share = f"{plan.rigid_fraction:.0%} of the simulated time"
+    share = format_rigid_share(plan.rigid_fraction, plan.history)
     if _uses_only_poor_windows(plan):
         return f"{use}: rigid {spans}, {share}, is planned only because of `min_quality` poor"
     text = f"{use}: make rigid {spans}, {share}"
@@ -378,8 +382,17 @@ def list_next_steps(
 ) -> list[tuple[str, str]]:
     """Return the next commands for the windows that can be used now, as (name, command) pairs.
 
-    If the deck has already been written with the cards, the next step is to run it.
+    If the deck has already been written with the cards, the next step is to run it. If the files are cut, the first
+    step is to copy them again.
     """
+    steps = _list_steps_for_record(plan, question, written_deck)
+    return add_step_to_copy(plan.history, steps)
+
+
+def _list_steps_for_record(
+    plan: RunPlan, question: RepeatedQuestion, written_deck: WrittenDeck | None
+) -> list[tuple[str, str]]:
+    """Return the next commands for the part of the run that was read."""
     if not plan.windows or _uses_only_poor_windows(plan):
         return _list_step_without_window(plan, question)
     waiting = any(row.status == "re-plan" for row in plan.flights)
@@ -422,10 +435,10 @@ def _list_step_without_window(
     if not rows:
         if plan.done:
             return []
+        if not plan.flights and not plan.history.complete:
+            return []
         if not plan.flights:
-            line = write_command(question, "info")
-            look = f"see what the run has to write with {line}"
-            return [("next", f"{look}, or give the end of the load as --after")]
+            return [("next", _name_step_without_flight(plan.history, question))]
         return [("next", _name_step_if_flights_are_short(question))]
     answer = max(rows, key=lambda row: row.end - row.start).answer
     assert answer is not None
@@ -435,6 +448,18 @@ def _list_step_without_window(
         answer.situation, better, question, otherwise, answer.decision
     )
     return [("next", step)]
+
+
+def _name_step_without_flight(history: History, question: RepeatedQuestion) -> str:
+    """Return the step if no flight is found; the end of the load is asked for unless the momentum shows no flight."""
+    line = write_command(question, "info")
+    look = f"see what the run has to write with {line}"
+    if not denies_every_flight(history):
+        return f"{look}, or give the end of the load as --after"
+    no_pair = f"{name_lack_of_pairs(question)}: {NEVER_FLIES}"
+    if any(momenta.parts for momenta in history.momenta):
+        return f"{no_pair}; run it without switching"
+    return f"{no_pair}; to find out whether single parts fly, {look}"
 
 
 def _name_step_if_flights_are_short(question: RepeatedQuestion) -> str:

@@ -121,8 +121,8 @@ _SHARED: Final = row(
 _RUNS: Final = Field("runs", many(RUN), "one entry for each run, in the order of the arguments",
                      lambda answer: list(add_errors(answer)))  # fmt: skip
 _MEANING: Final = (
-    "Answer of d2rpick study; times in the unit of the histories. With -f ndjson each run is a line that follows "
-    "$defs/line; the last line follows $defs/last."
+    "Answer of d2rpick study; times in the unit of the histories. With -f ndjson, each run is a line that conforms "
+    "to $defs/line; the last line conforms to $defs/last."
 )
 # Newline-delimited JSON has one line per run, written by `d2rpick.api.studies`, and a last line of common results.
 _CURVE: Final = get_kind(many(many("number")), minItems=2, maxItems=2)

@@ -21,6 +21,7 @@ from d2rpick.report.decision import (
 )
 from d2rpick.report.fields import Document, Field, many, maybe, row, write_csv
 from d2rpick.report.next_step import (
+    add_step_to_copy,
     name_step_after_refusal,
     name_step_with_pair,
     write_command,
@@ -210,7 +211,10 @@ def list_evidence(answer: PairSuggestion) -> list[tuple[str, str]]:
     decision = answer.decision
     if best is None or decision is None:
         return []
-    lines = [*list_statements(decision), ("rigid for", format_rigid_time(best))]
+    lines = [
+        *list_statements(decision),
+        ("rigid for", format_rigid_time(best, answer.situation.history)),
+    ]
     if saves := format_saving(best):
         lines.append(("saves", saves))
     if answer.situation.vibration.keeps_nothing:
@@ -233,7 +237,7 @@ def list_next_step(
         step = name_step_with_pair(
             answer.situation, times, decision.better, question, "suggest"
         )
-    return [("next", step)]
+    return add_step_to_copy(answer.situation.history, [("next", step)])
 
 
 def _name_step_after_refusal(

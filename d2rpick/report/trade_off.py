@@ -15,6 +15,7 @@ from d2rpick.report.decision import (
 )
 from d2rpick.report.fields import Document, Field, many, maybe, row, write_csv
 from d2rpick.report.next_step import (
+    add_step_to_copy,
     name_step_after_refusal,
     name_step_with_pair,
     write_command,
@@ -142,7 +143,7 @@ def list_next_step(
             question._replace(times=times),
             "suggest",
         )
-    return [("next", step)]
+    return add_step_to_copy(trade_off.situation.history, [("next", step)])
 
 
 def _list_verdict_of_chosen(trade_off: TradeOff) -> list[tuple[str, str]]:

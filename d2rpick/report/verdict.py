@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.base.errors import make_printable
 from d2rpick.choice.pair.grades import DO_NOT_USE
+from d2rpick.choice.pair.warnings import POOR_RESIDUAL
 from d2rpick.choice.switched.comparison import MOST_MOMENTUM_ERROR
 from d2rpick.report import keys, tables
 from d2rpick.report.decision import (
@@ -17,6 +18,7 @@ from d2rpick.report.decision import (
 )
 from d2rpick.report.fields import Document, Field, get_kind, maybe, row
 from d2rpick.report.next_step import (
+    add_step_to_copy,
     name_step_after_refusal,
     name_step_with_pair,
     write_command,
@@ -90,9 +92,7 @@ def as_table(answer: PairVerdict, display: DisplayOptions) -> str:
         *list_pair_verdict(answer),
         *list_next_step(answer, display),
     ]
-    if answer.switched:
-        verdict_lines = [list_comparison_verdict(answer.switched), *verdict_lines]
-    lines = tables.format_in_line(verdict_lines)
+    lines = tables.format_in_line(place_comparison(answer, verdict_lines))
     if answer.switched:
         lines += ["", *_format_comparison(answer.switched)]
     listed = [*list_pair_evidence(answer), *above, *remarks]
@@ -130,27 +130,64 @@ def list_next_step(
             decision,
         )
     elif answer.switched and display.page:
-        step = (
-            f"{_name_usable_results(decision)}; {display.page} contains the comparison"
-        )
+        step = f"{_name_usable_results(answer)}; {display.page} contains the comparison"
     elif answer.switched:
         words = (*question.times, "--report", "verify.html")
         line = write_command(question, "verify", *words)
-        step = f"{_name_usable_results(decision)}; keep the comparison with {line}"
+        step = f"{_name_usable_results(answer)}; keep the comparison with {line}"
     else:
         pair = (answer.candidate.tr, answer.td)
         step = name_step_with_pair(situation, pair, decision.better, question, "card")
-    return [("next", step)]
+    return add_step_to_copy(situation.history, [("next", step)])
 
 
-def _name_usable_results(decision: Decision) -> str:
-    """Return the advice to use the switched run, with the restriction that the reason for the verdict also names."""
-    usable = "only the motion" if decision.allows_only_motion else "the results"
+def _name_usable_results(answer: PairVerdict) -> str:
+    """Return the advice to use the switched run, restricted to the motion if its vibration is known to be wrong."""
+    decision = answer.decision
+    switched = answer.switched
+    is_kept = switched is None or _keeps_vibration(switched, decision)
+    usable = "the results"
+    if decision.allows_only_motion or not is_kept:
+        usable = "only the motion"
     return f"use {usable} of the switched run"
 
 
-def list_comparison_verdict(switched: Comparison) -> tuple[str, str]:
-    """Return a row: its name, and whether the switched run agrees with the reference run within the limits."""
+def place_comparison(
+    answer: PairVerdict, verdict_lines: list[tuple[str, str]]
+) -> list[tuple[str, str]]:
+    """Return the lines of a verdict with that of the comparison, which is first only if the two agree."""
+    compared = list_comparison(answer)
+    if answer.switched and _contradicts_verdict(answer.switched, answer.decision):
+        decision, reason, *others = verdict_lines
+        return [decision, reason, *compared, *others]
+    return [*compared, *verdict_lines]
+
+
+def list_comparison(answer: PairVerdict) -> list[tuple[str, str]]:
+    """Return a row with its name: whether the switched run agrees with the reference run; none without such a run.
+
+    If the pair is not to be used although no limit is exceeded, the row states only which values are within limits.
+    """
+    switched = answer.switched
+    if switched is None:
+        return []
+    compared = ", ".join(_list_limited_values(switched))
+    if _contradicts_verdict(switched, answer.decision):
+        return [("comparison", _describe_partial_comparison(switched, compared))]
+    verdict = "failed" if switched.objections else "passed"
+    text = ": ".join(filter(None, (verdict, compared)))
+    if not _keeps_vibration(switched, answer.decision):
+        text += f"; {_describe_spread(switched)}"
+    return [("comparison", text)]
+
+
+def _contradicts_verdict(switched: Comparison, decision: Decision) -> bool:
+    """Return True if the comparison exceeds no limit, but the pair is not to be used."""
+    return not switched.objections and decision.verdict == DO_NOT_USE
+
+
+def _list_limited_values(switched: Comparison) -> list[str]:
+    """Return the compared values that have limits, each with its limits."""
     compared = []
     if switched.mean_after_reference > 0:
         ratio = switched.mean_after / switched.mean_after_reference
@@ -163,14 +200,43 @@ def list_comparison_verdict(switched: Comparison) -> tuple[str, str]:
         compared.append(
             f"momentum error after td {switched.momentum_error:.2%} ({limit})"
         )
-    verdict = "failed" if switched.objections else "passed"
-    return "comparison", ": ".join(filter(None, (verdict, ", ".join(compared))))
+    return compared
+
+
+def _describe_partial_comparison(switched: Comparison, compared: str) -> str:
+    """Return the row of a comparison that exceeds no limit although the pair is not to be used."""
+    within = f"within limits: {compared or 'nothing with a limit is known'}"
+    meaning = "this does not show that the vibration is kept"
+    return f"{within}; {meaning}: {_describe_spread(switched)}"
+
+
+def _keeps_vibration(switched: Comparison, decision: Decision) -> bool:
+    """Return False if the amplitude after td seems to be wrong by more than the largest usable residual.
+
+    The energy varies with the square of the amplitude, and by less if the parts vibrate about a deformed shape.
+    """
+    if decision.at_rest:
+        return True
+    spread = switched.spread_after
+    reference = switched.spread_after_reference
+    smallest = (1 - POOR_RESIDUAL) ** 2 * reference
+    largest = (1 + POOR_RESIDUAL) ** 2 * reference
+    return smallest <= spread <= largest
+
+
+def _describe_spread(switched: Comparison) -> str:
+    """Return the standard deviation of the energy after td in the switched run, relative to the reference run."""
+    spread = f"standard deviation of the energy after td {switched.spread_after:.3g}"
+    return f"{spread}, in the reference run {switched.spread_after_reference:.3g}"
 
 
 def list_pair_evidence(answer: PairVerdict) -> list[tuple[str, str]]:
     """Return the evidence for the verdict, the rigid time, and the accuracy of tr, each with its name."""
     best = answer.candidate
-    lines = [*list_statements(answer.decision), ("rigid for", format_rigid_time(best))]
+    lines = [
+        *list_statements(answer.decision),
+        ("rigid for", format_rigid_time(best, answer.situation.history)),
+    ]
     if best.run_time_share is not None:
         lines.append(("saves", format_saved_share(best.run_time_share)))
     if exact := format_accuracy(best):
@@ -204,14 +270,9 @@ def list_known_measures(answer: PairVerdict) -> list[tuple[str, tables.Cell]]:
 def as_markdown(answer: PairVerdict, display: DisplayOptions) -> str:
     """Return the verdict, and the values of the pair as a Markdown table with two columns."""
     switched = answer.switched
-    comparison_lines = [list_comparison_verdict(switched)] if switched else []
+    verdict_lines = [*list_pair_verdict(answer), *list_next_step(answer, display)]
     paragraphs = tables.format_as_list(
-        (
-            *comparison_lines,
-            *list_pair_verdict(answer),
-            *list_next_step(answer, display),
-            *list_pair_evidence(answer),
-        )
+        (*place_comparison(answer, verdict_lines), *list_pair_evidence(answer))
     )
     table = tables.as_markdown(("measure", "value"), list_known_measures(answer))
     if switched:

@@ -29,8 +29,8 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "Give the end of the load with --after, or write the part momenta in the next run.",
         ),
         "flight-sources-disagree": Explanation(
-            "Two kinds of evidence give different flights. d2rpick uses the later start and the earlier end, and the "
-            'verdict is at best "use with care".',
+            "Two kinds of evidence give different flights. d2rpick uses the later start and the earlier end, or the "
+            'times that you gave with --after and --landing. The verdict is at best "use with care".',
             "Compare both flights with the animation of the run, then give --after and --landing.",
         ),
         "flight-uncertain": Explanation(
@@ -100,7 +100,7 @@ EXPLANATIONS_BY_TOPIC: Final = {
         ),
         "flight-outside-record": Explanation(
             "The momenta show a flight that lasts longer than the record of the energy. The files may belong to "
-            "different runs, or one of them was cut.",
+            "different runs, or one of them was truncated.",
             "Give the files of one run only, or copy the shorter file again.",
         ),
         "no-energy": Explanation(
@@ -120,7 +120,7 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "Use --part to name the parts that were switched together.",
         ),
         "plastic-or-preload": Explanation(
-            "Plastic work and a preload describe this energy equally well. The pair is the same in both cases, but "
+            "Plastic work and a preload explain this energy equally well. The pair is the same in both cases, but "
             "the direction of the deformation may differ.",
             "Nothing to do unless the parts are preloaded. In that case compare with a finished switched run (verify "
             "--switched).",
@@ -145,7 +145,7 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "Do not use the energies of this run. Run the model again with a newer version.",
         ),
         "few-states": Explanation(
-            "The file has too few states to show how the energy vibrates, so the level at td is uncertain.",
+            "The file has too few states to show how the energy oscillates, so the level at td is uncertain.",
             "Use a file with more states, such as glstat, matsum or binout.",
         ),
         "no-part-history": Explanation(
@@ -174,8 +174,8 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "Check which contact acts. Part momenta show whether it acts on the chosen parts.",
         ),
         "energy-ratio": Explanation(
-            "The total energy differs by more than 10 % from the initial energy and the external work. Energies that "
-            "are not balanced can mislead the choice of tr.",
+            "The total energy differs by more than 10 % from the sum of initial energy and external work. If the "
+            "energies do not balance, the recommended tr may be wrong.",
             "Find the cause in the reference run, such as mass scaling, contacts or hourglassing, and run it again.",
         ),
         "energy-too-large": Explanation(
@@ -240,7 +240,8 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "Correct the initial velocity as rule D2R407 explains.",
         ),
         "card-objection": Explanation(
-            "A check of the deck together with this card finds a problem. The solver may stop, or switch other parts.",
+            "A check of the deck together with this card finds a problem. The solver may stop, or switch the wrong "
+            "parts.",
             "Read the rule that the warning names (d2rpick rule ID), and correct the card or the deck.",
         ),
         "cost-unknown": Explanation(
@@ -253,8 +254,8 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "Nothing to do if it is the deck of this run. Otherwise give another deck with --deck, or use --no-deck.",
         ),
         "deck-not-followed": Explanation(
-            "d2rpick cannot evaluate a part of the deck, such as a curve or a sensor, and uses the history instead. Or "
-            "the deck already contains switching cards, which the answer does not consider.",
+            "Either d2rpick cannot evaluate an item of the deck, such as a curve or a sensor, and uses the history "
+            "instead, or the deck already contains switching cards, which the answer does not consider.",
             "Check the named line. If it is a load, give its end with --after.",
         ),
         "deck-of-another-model": Explanation(
@@ -303,7 +304,7 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "Read the reasons next to the parts.",
         ),
         "parts-not-in-deck": Explanation(
-            "Parts of the history are missing in the deck, so their costs and connections are unknown.",
+            "Parts of the history are missing from the deck, so their costs and connections are unknown.",
             "Give the deck of this run, with all its include files.",
         ),
         "parts-not-joined": Explanation(
@@ -342,9 +343,20 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "Leave the part out of --part.",
         ),
         "weights-by-analogy": Explanation(
-            "The cost of some element formulations was not measured. d2rpick uses the cost that OpenRadioss has for a "
-            "similar formulation, so the saving is a rough estimate.",
+            "The cost of some element formulations was not measured. d2rpick uses the cost of a similar "
+            "formulation, measured with OpenRadioss, so the saving is a rough estimate.",
             "Calibrate with runs of your own solver (d2rpick calibrate).",
+        ),
+        "deck-of-another-solver": Explanation(
+            "One solver wrote the history, and the deck is for the other solver. d2rpick uses the loads, connections "
+            "and costs of the deck, which hold only if both describe the same model.",
+            "Give the deck of the run, or check that both models are the same.",
+        ),
+        "built-in-weights": Explanation(
+            "Your weights lack some element formulations of the deck. For these, d2rpick uses the built-in weights, "
+            "multiplied by the median ratio of your weights to the built-in weights.",
+            "Calibrate also with runs that contain these formulations (d2rpick calibrate), or add their weights under "
+            "[per_element].",
         ),
     },
     "Plans": {

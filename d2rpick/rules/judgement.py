@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 from d2rpick.base.errors import Caution, DeckError, give_if_written, name_units
 from d2rpick.choice.answers import PairVerdict, find_better_pair, suggest_at, verify_run
 from d2rpick.choice.health import WRONG_ENERGY
-from d2rpick.choice.pair.quality import list_exceeded_limits
+from d2rpick.choice.pair.quality import list_exceeded_limits, name_parts_in_verify
 from d2rpick.choice.pair.situation import examine_td
 from d2rpick.choice.pair.warnings import (
     POOR_KINETIC_SHARE,
@@ -255,7 +255,7 @@ class HistoryJudge:
         for caution in verdict.cautions:
             if caution.code in _KEPT:
                 self._cautions.setdefault(caution, []).extend(parts)
-        return Judgement(tuple(find_faults(verdict)), verdict.decision)
+        return Judgement(tuple(find_faults(verdict)), _decide_in_check(verdict))
 
 
 def _find_times_outside(
@@ -287,9 +287,15 @@ def _find_times_outside(
         )
 
 
+def _decide_in_check(verdict: PairVerdict) -> Decision:
+    """Return the verdict on a pair, with cures that refer to no option that the check lacks."""
+    decision = verdict.decision
+    return decision._replace(quality=name_parts_in_verify(decision.quality))
+
+
 def find_faults(verdict: PairVerdict) -> Iterator[Fault]:
     """Yield the problems that follow from a verdict; an inadmissible pair leads to at least one error."""
-    situation, decision = verdict.situation, verdict.decision
+    situation, decision = verdict.situation, _decide_in_check(verdict)
     limit_faults = [*_judge_limits(verdict)]
     faults = [*_judge_flight(verdict), *_judge_error(verdict), *limit_faults]
     if not verdict.admissible and not faults:

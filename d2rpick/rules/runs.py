@@ -378,7 +378,7 @@ def _has_deformable(case: RunCase, rigid: set[int]) -> bool:
 @make_rule_decorator("D2R405", WARNING, "engine files with different /VERS", (RADIOSS,))
 def _check_versions(case: RunCase) -> Iterator[Objection]:
     """/VERS defines how the fields of an engine file are read. Source: Altair's help for /VERS. No run has shown that
-    different versions do harm.
+    different versions cause errors.
 
     Fix: Give all engine files of the run the same /VERS.
     """

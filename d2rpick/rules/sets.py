@@ -214,7 +214,8 @@ def _describe_mismatch(first: SwitchHeader, second: SwitchHeader) -> str:
 )
 @make_rule_decorator("D2R006", WARNING, "PAIRED together with CODE 0")
 def _check_timed_pairs(case: Case) -> Iterator[Objection]:
-    """The sets of a pair act in turn on a force. Two unpaired sets suffice for a window defined by times (CODE 0).
+    """Two paired switch sets act alternately, triggered by a force. A window defined by times (CODE 0) needs only two
+    unpaired sets.
 
     Fix: Set PAIRED and RELSW to 0.
     """
@@ -487,7 +488,7 @@ def _check_chatter(case: Case) -> Iterator[Objection]:
     if it has the part momenta and the deck has only one contact or wall, d2rpick evaluates the switches over the
     history. Rigid windows shorter than 10 % of the longest window are not flights but chatter. There is no chatter if
     TIME3 of the set that makes the parts deformable (Radioss: Tdelay of the sensor) is longer than the contact. d2rpick
-    does not see a force that begins and ends within one output interval.
+    cannot detect a force that begins and ends within one output interval.
 
     Fix: Raise TIME3 (Radioss: Tdelay) to the value in the finding.
     """

@@ -191,7 +191,7 @@ def _check_never_back(case: Case) -> Iterator[Objection]:
 @make_rule_decorator(
     "D2R106",
     ERROR,
-    "part or part set not in the deck (only when every include was read)",
+    "part or part set not in the deck (only if every include file was read)",
 )
 def _check_ids_exist(case: Case) -> Iterator[Objection]:
     """A switching card names a part, part set or lead part that no *PART or *SET_PART defines, or a part set without

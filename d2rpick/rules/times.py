@@ -263,9 +263,9 @@ def _find_timed(case: Case) -> list[tuple[SwitchSet, SwitchHeader]]:
     "D2R114", ERROR, "all switching times are equal (decimals lost in writing)"
 )
 def _check_equal_times(case: Case) -> Iterator[Objection]:
-    """Programs that print times with one decimal write 0.0 for every time below 0.05, and 0.1 for 0.07 and 0.13. Cards
-    that make parts rigid and cards that make them deformable, all at the same time, are a sign of this. Source: a
-    public drop tool wrote such decks.
+    """Programs that print times with one decimal write 0.0 for every time below 0.05, and 0.1 for 0.07 and 0.13. If all
+    cards switch at the same time, the decimals were probably lost in this way. Source: a public drop tool wrote such
+    decks.
 
     Fix: Print the times with more decimals.
     """
@@ -388,7 +388,8 @@ def _check_units_of_history(case: Case) -> Iterator[Objection]:
     """The deck may be in microseconds or milliseconds, and the history in seconds. Files contain no unit names, so
     d2rpick compares the two end times. If D2R115 or D2R207 reports the same mistake, this rule does not.
 
-    Fix: Give deck and history in the same time unit.
+    Fix: Give the history that the solver wrote: it has the time unit of its deck. If you have only a converted table,
+    convert its times back.
     """
     assert case.judge is not None
     if case.end is None or case.end_time is None or not case.judge.end > 0:
@@ -424,7 +425,8 @@ def _check_times_of_history(case: Case) -> Iterator[Objection]:
     multiplied by 1000. Files contain no unit names, so d2rpick infers this from the magnitudes. Other times outside the
     history are reported by D2R205.
 
-    Fix: Give deck and history in the same time unit.
+    Fix: If the history was converted to another time unit, give the history that the solver wrote: it has the time unit
+    of its deck. Otherwise correct the times on the cards.
     """
     windows = case.windows.windows
     times = [
@@ -471,7 +473,7 @@ def _check_locked_in_error(case: Case) -> Iterator[Objection]:
 def _check_sign(case: Case) -> Iterator[Objection]:
     """In each oscillation cycle a part passes every energy level twice in tension and twice in compression. If the
     frozen deformation has the wrong sign, the vibration after td is worse than without any frozen deformation. The sign
-    is known only if an oscillator describes the history.
+    is known only if a vibration model (oscillator, modal or swings) describes the history.
 
     Fix: Replace tr, or both times, by the times in the finding, which have the right sign.
     """
@@ -503,9 +505,7 @@ def _check_kinetic_share(case: Case) -> Iterator[Objection]:
     ]
 )
 @set_failing(lambda: [_make_pair_deck(".0128853", "0.064")])
-@make_rule_decorator(
-    "D2R209", ERROR, "a pair of poor quality (below --min-quality)", BOTH
-)
+@make_rule_decorator("D2R209", ERROR, "a pair with a grade below --min-quality", BOTH)
 def _check_quality(case: Case) -> Iterator[Objection]:
     """The pair is admissible, but the history shows that the motion or the vibration after td will be wrong, or does
     not show that they will be right. d2rpick judges the pair in the same way as d2rpick verify. With --min-quality

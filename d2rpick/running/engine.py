@@ -72,7 +72,9 @@ class Commands(NamedTuple):
         ConfigurationError
             If the command cannot be split or does not contain the deck, or if no installation is known.
         """
-        template = getattr(self, program) or _find_installed(program)
+        template = self._find_template(program)
+        if template is None:
+            raise self._report_unknown_programs()
         if "{deck}" not in template:
             raise ConfigurationError(
                 f"--{program} {template!r}: {{deck}} was expected, where the name of the file goes"
@@ -88,6 +90,21 @@ class Commands(NamedTuple):
             words[0] = str(Path(words[0]).absolute())
         words = [word.replace("{threads}", str(self.threads)) for word in words]
         return [word.replace("{deck}", deck) for word in words]
+
+    def _find_template(self, program: str) -> str | None:
+        """Return the given command of a program, or that of the installation; None if neither exists."""
+        given: str | None = getattr(self, program)
+        return given or _find_installed(program)
+
+    def _report_unknown_programs(self) -> ConfigurationError:
+        """Return the error that names every program whose command is unknown, so that one answer corrects all."""
+        unknown = [name for name in _PROGRAMS if self._find_template(name) is None]
+        names = " and no ".join(unknown)
+        are = "is" if len(unknown) == 1 else "are"
+        options = " and ".join(f"--{name} 'CMD {{deck}}'" for name in unknown)
+        return ConfigurationError(
+            f"no {names} {are} known; set {_HOME} to the folder of OpenRadioss, or give {options}"
+        )
 
     def make_environment(self) -> dict[str, str]:
         """Return the environment of the programs: the current environment plus the variables of an installation."""
@@ -107,17 +124,15 @@ class Commands(NamedTuple):
         return ""
 
 
-def _find_installed(program: str) -> str:
-    """Return the command of an installed program; raise ConfigurationError if it is not installed."""
+def _find_installed(program: str) -> str | None:
+    """Return the command of an installed program; None if it is not installed."""
     home = os.environ.get(_HOME, "")
     names, arguments = _PROGRAMS[program]
     for name in names:
         path = Path(home, name)
         if home and path.is_file():
             return f"{shlex.quote(str(path.resolve()))} {arguments}"
-    raise ConfigurationError(
-        f"no {program} is known; set {_HOME} to the folder of OpenRadioss, or give --{program} 'CMD {{deck}}'"
-    )
+    return None
 
 
 @contextmanager

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from d2rpick.base.errors import ArgumentError
 from d2rpick.deck import read_inventory
-from d2rpick.deck.first_run_cards import FirstRun, print_first_run_cards
+from d2rpick.deck.first_run_cards import FirstRunDeck, print_first_run_cards
 from d2rpick.deck.radioss_run import find_parts_off, read_run
 from d2rpick.running.checks import refuse_held
 from d2rpick.running.inner_motion import Wait, check_wait, wait_of_deck
@@ -59,11 +59,11 @@ def first_card(
         chosen = chosen or find_parts_off(read_run(path))
     if not chosen:
         raise ArgumentError(
-            f"no parts were given, and {path} keeps no body off; name them with `parts`"
+            f"no parts were given, and {path} deactivates no rigid body (/RBODY/OFF); name them with `parts`"
         )
     refuse_held(path, inventory, chosen)
     needed = _choose_wait(path, inventory, wait)
-    first_run = FirstRun(path, inventory, chosen, needed.time, needed.reason, after)
+    first_run = FirstRunDeck(path, inventory, chosen, needed.time, needed.reason, after)
     return print_first_run_cards(first_run), needed
 
 

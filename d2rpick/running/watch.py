@@ -57,6 +57,8 @@ class News(NamedTuple):
         Latest flight; None if there is none yet.
     knows_wait : bool
         True if the waiting time is known, i.e. the force-free time after which a flight is detected.
+    later_files : tuple of str
+        Files of later restart segments that were read although the user did not name them.
     ending : str or None
         How the run ended according to its listing; None if it may still be running.
     silence : float or None
@@ -71,6 +73,7 @@ class News(NamedTuple):
     undone_events: tuple[RunEvent, ...] = ()
     flight: SeenFlight | None = None
     knows_wait: bool = False
+    later_files: tuple[str, ...] = ()
     ending: str | None = None
     silence: float | None = None
     error: D2RPickError | None = None
@@ -148,6 +151,7 @@ class Watch:
             undone_events=events_before[kept_count:],
             flight=flights[-1] if flights else None,
             knows_wait=wait is not None,
+            later_files=tuple(find_later_legs(expand(self._names))),
         )
 
 

@@ -11,6 +11,7 @@ from hypothesis import given, strategies as st
 
 from d2rpick.base.errors import ConfigurationError
 from d2rpick.choice.parts.cost import (
+    MEASURED,
     CostModel,
     Weights,
     compute_saved_share,
@@ -198,3 +199,18 @@ def test_weights_that_make_no_sense_are_refused_with_the_file(
 
 def test_counts_by_part_are_counters() -> None:
     assert make_inventory({1: 3}).counts == {1: Counter(shell=3)}
+
+
+def test_weights_that_lack_a_formulation_keep_the_ratios_of_the_built_in_ones() -> None:
+    """Only ratios matter, so that all weights times a factor give the same share, with or without some of them."""
+    qeph = require(find_radioss_formulation("shell", 24, 0, 0))
+    mesh = make_inventory({1: 30, 2: 70}, formulations={2: qeph})
+    built_in = CostModel(mesh)
+    some = CostModel(
+        mesh, Weights({"QBAT": 5 * MEASURED["QBAT"], "point": 5 * MEASURED["point"]})
+    )
+    assert some.share_of(1).value == pytest.approx(require(built_in.share_of(1).value))
+    assert some.built_in == (qeph.name,)
+    assert built_in.built_in == ()
+    foreign = CostModel(mesh, Weights({"strange": 1.0}))
+    assert foreign.share_of(1).value is None

@@ -1,10 +1,16 @@
 """The first lines of the output say what to decide, and on which limit the decision is based."""
 
+import gzip
+from dataclasses import replace
+from pathlib import Path
+
 import pytest
 
+import d2rpick
 from d2rpick.choice.options import Limit
 from d2rpick.choice.switched.comparison import MOST_MOMENTUM_ERROR
-from tests.command import MATSUM, ROOT, run, run_json
+from d2rpick.report.formats import DisplayOptions
+from tests.command import MATSUM, ROOT, put, run, run_json
 
 SAMPLES = ROOT / "sample_data"
 T01 = str(SAMPLES / "rolloverT01.gz")
@@ -106,3 +112,75 @@ def test_a_plan_says_in_which_run_a_window_can_be_used(
     )
     assert lines[head].split()[-2:] == ["switch", "in"]
     assert lines[head + 1].endswith(cell)
+
+
+def test_limits_that_are_kept_do_not_praise_a_pair_that_is_not_to_be_used() -> None:
+    result = run(*SWITCHED[:2], "--max-residual", "0.01", *SWITCHED[2:])
+    assert result.exit_code == 1
+    text = join_lines(result.stdout)
+    assert text.startswith("do not use tr = ")
+    assert "passed" not in text
+    decided, compared = text.split(" comparison ")
+    assert "why residual 0.0386 above the limit 0.01" in decided
+    assert compared.startswith("within limits: mean energy after td 108% of the")
+    assert (
+        "this does not show that the vibration is kept: standard deviation of the energy after td 2.12, in the "
+        "reference run 2.08" in compared
+    )
+
+
+@pytest.mark.parametrize(
+    ("ratio", "usable"),
+    [(0.2, "only the motion"), (1, "the results"), (12, "only the motion")],
+)
+def test_a_switched_run_that_vibrates_differently_is_used_for_the_motion_only(
+    ratio: float, usable: str
+) -> None:
+    reference = d2rpick.read(SAMPLES / "oscillator")
+    computed = d2rpick.read(SAMPLES / "oscillator_switched")
+    answer = d2rpick.verify(reference, switched=computed)
+    switched = answer.switched
+    assert switched
+    spread = ratio * switched.spread_after_reference
+    differing = replace(answer, switched=switched._replace(spread_after=spread))
+    text = join_lines(differing.text("table", DisplayOptions()))
+    assert f"use {usable} of the switched run" in text
+    is_named = f"standard deviation of the energy after td {spread:.3g}, in" in text
+    assert is_named is (ratio != 1)
+
+
+def cut_file(folder: Path, source: Path, size: int) -> str:
+    """Write the first ``size`` bytes of a file, and return the path."""
+    opened = gzip.open if source.suffix == ".gz" else open
+    with opened(source, "rb") as file:
+        return str(put(folder / source.stem, file.read(size)))
+
+
+def test_a_window_of_a_cut_file_is_that_of_the_part_that_was_read(
+    tmp_path: Path,
+) -> None:
+    cut = cut_file(tmp_path, SAMPLES / "energy.glstat", 100_000)
+    plan = join_lines(run("plan", cut).stdout)
+    assert plan.startswith("use: make rigid from ")
+    share, rest = plan.split("of the record that was read", 1)
+    assert share.endswith("92% ")
+    assert "note the record ends early, at 0.0316, within a state: " in rest
+    assert "next copy the file again, or let the run finish. For the part " in rest
+    times = ("--td", "0.031")
+    judged = ("suggest", *times), ("verify", "--tr", "0.002", *times)
+    for command in judged:
+        text = join_lines(run(*command, cut).stdout)
+        assert "the record ends early, at 0.0316, within a state" in text
+        assert "next copy the file again" in text
+        assert "of the simulated time" not in text
+
+
+def test_no_flight_in_a_cut_file_is_a_reason_to_copy_it_again(tmp_path: Path) -> None:
+    cut = cut_file(tmp_path, Path(T01), 60_000)
+    for command in ("plan", "suggest", "explore", "info"):
+        answer = run(command, cut)
+        text = join_lines(answer.stdout + answer.stderr)
+        assert "copy the file again, or let the run finish" in text
+        assert "--after" not in text
+        assert "has to write" not in text
+        assert "without switching" not in text

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import d2rpick as d2
-from tests.command import BOX, ROOT, run, start_program
+from tests.command import BOX, ROOT, run, run_json, start_program
 
 CAR = str(ROOT / "tests/data/carT01.gz")
 
@@ -69,3 +69,21 @@ def test_an_interrupt_ends_it_with_a_line(tmp_path: Path) -> None:
         -signal.SIGINT,
         b"d2rpick: interrupted",
     )
+
+
+def test_the_next_command_and_the_notes_name_every_restart_segment() -> None:
+    """Follow reads later restart segments too, so that its command must name them; other commands mention them."""
+    first, later = (
+        str(ROOT / f"sample_data/oscillator_switched/OSCT0{number}.gz")
+        for number in (1, 2)
+    )
+    last = later.replace("T02", "T03")
+    followed = run("follow", "--once", first).stdout
+    shown = " ".join(followed.split())
+    assert f"choose times with d2rpick plan {first} {later} {last}" in shown
+    note = f"{later}, {last} in the same folder were not read"
+    assert any(note in text for text in run_json("info", first)["notes"])
+    both = run_json("info", first, later)["notes"]
+    assert any(f"{last} in the same folder was not read" in text for text in both)
+    all_legs = run_json("info", first, later, last)["notes"]
+    assert not any("same folder" in text for text in all_legs)

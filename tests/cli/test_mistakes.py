@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.command import GLSTAT, ROOT, read_refusal, run, run_json
+from tests.command import BOX, GLSTAT, ROOT, read_refusal, run, run_json
 
 ENERGY = "sample_data/energy.csv"
 MATSUM = "sample_data/rollover_box.matsum"
@@ -246,3 +246,47 @@ def test_a_td_outside_the_flight_is_warned_about_once(td: str) -> None:
     warnings = [line for line in answer.stderr.splitlines() if "warning: " in line]
     assert len([line for line in warnings if f"td = {td}" in line]) == 1
     assert "the nearest flight is 0.086 to 0.379; td must lie in it" in answer.stderr
+
+
+def test_a_folder_without_a_deck_is_not_answered_with_the_advice_to_give_a_file(
+    tmp_path: Path,
+) -> None:
+    """Calibrate reads folders only, so it must not ask for the deck itself."""
+    answer = read_refusal("calibrate", str(tmp_path))
+    assert "give the folder that contains the deck and the listings" in answer
+    assert "give the deck itself" not in answer
+
+
+def test_a_packed_deck_in_a_folder_is_named(tmp_path: Path) -> None:
+    packed = tmp_path / "RUN_0000.rad.gz"
+    packed.write_bytes(b"")
+    assert f"{packed} is packed); unpack it" in read_refusal("check", str(tmp_path))
+
+
+def test_a_dry_run_names_every_program_that_is_unknown(tmp_path: Path) -> None:
+    deck = str(ROOT / "sample_data/falling_plate/plate_0000.rad")
+    question = ("drive", deck, "--part", "1", "--wait", "0.02", "--dry-run")
+    folder = ("-o", str(tmp_path / "driven"))
+    both = run(*question, *folder).stderr
+    assert "no starter and no engine are known" in both
+    assert "--starter 'CMD {deck}' and --engine 'CMD {deck}'" in both
+    one = run(*question, *folder, "--starter", "starter {deck}").stderr
+    assert "no engine is known" in one
+
+
+def test_a_switched_run_that_ends_rigid_is_not_blamed_on_td() -> None:
+    """No td was given, so the cause is that the record ends while the parts are rigid."""
+    answer = read_refusal("verify", "--switched", ENERGY, BOX)
+    assert "while the parts are still rigid" in answer
+    assert "give a finished switched run" in answer
+
+
+def test_a_deck_of_the_other_solver_is_named_with_the_history() -> None:
+    deck = str(ROOT / "sample_data/rollover_box.k")
+    warnings = run_json("suggest", "--deck", deck, "--part", "box", BOX)["warnings"]
+    (message,) = (
+        warning["message"]
+        for warning in warnings
+        if warning["code"] == "deck-of-another-solver"
+    )
+    assert message.startswith(f"{BOX} was written by Radioss, but {deck} is a deck of")

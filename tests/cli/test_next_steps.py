@@ -3,12 +3,19 @@
 import html
 import re
 import shlex
+from math import sin
 from pathlib import Path
 
 import pytest
 
 from d2rpick.choice.pair.grades import VERDICTS
-from d2rpick.choice.pair.quality import Cause, Grade, Quality, omit_comparison
+from d2rpick.choice.pair.quality import (
+    Cause,
+    Grade,
+    Quality,
+    name_parts_in_verify,
+    omit_comparison,
+)
 from tests import variants
 from tests.command import (
     BOX,
@@ -158,6 +165,30 @@ def test_after_the_comparison_with_a_switched_run_none_is_asked_for() -> None:
     quality = omit_comparison(Quality(grade, grade, grade))
     cures = {cause.cure for cause in (*quality.causes, *quality.alone.causes)}
     assert cures == {"write more often"}
+
+
+@pytest.mark.slow
+def test_no_spring_is_advised_to_become_rigid() -> None:
+    """The energy of springs with dampers would be left out, so that choosing them too changes nothing."""
+    car = str(ROOT / "tests/data/carT01.gz")
+    answer = run_json("suggest", "--part", "1-14", car)
+    assert answer["verdict"] == "do not use"
+    assert answer["cure"] == "compare with a finished switched run"
+    step = find_line("next", "suggest", "--part", "1-14", car)
+    assert "15" not in step
+
+
+def test_a_check_advises_no_option_that_it_lacks() -> None:
+    """The parts of a window come from the deck, so the cure names the command that has the option --part."""
+    cure = "name the parts to be switched with `parts`, if the files contain parts"
+    grade = Grade("poor", (Cause("unknown", cure),))
+    quality = name_parts_in_verify(Quality(grade, grade, grade))
+    cures = {cause.cure for cause in (*quality.causes, *quality.alone.causes)}
+    assert cures == {
+        "judge the pair with d2rpick verify by the energy of its parts (`parts`), if the files contain parts"
+    }
+    check_options = run("check", "--help").stdout
+    assert "--part" not in check_options
 
 
 @pytest.mark.slow
@@ -721,3 +752,29 @@ def test_the_better_pair_of_verify_is_good_at_once(tr: str, td: str) -> None:
     # A row of the candidates at this td names the same pair.
     candidates = run_json("suggest", "--td", td, ENERGY)["candidates"]
     assert verdict["cure"] in {row["cure"] for row in candidates}
+
+
+def test_no_step_asks_for_an_end_of_the_load_that_the_momentum_denies(
+    tmp_path: Path,
+) -> None:
+    """A block slides with friction all the time."""
+    times = [state / 400 for state in range(401)]
+    lines = [
+        f"{time},{5 + 5 * sin(30 * time) ** 2},{500 - 40 * time},0,0,10"
+        for time in times
+    ]
+    head = "time,internal_energy,x_momentum,y_momentum,z_momentum,mass"
+    table = tmp_path / "slide.csv"
+    table.write_text("\n".join([head, *lines]))
+    for command in ("plan", "suggest", "explore", "info"):
+        answer = run(command, str(table))
+        text = " ".join((answer.stdout + answer.stderr).split())
+        assert "--after" not in text
+        assert "no flight is found" in text or "no free flight is found" in text
+    given = run("plan", "--after", "0.2", str(table))
+    text = " ".join(given.stdout.split())
+    assert text.startswith("use with care: make rigid from ")
+    assert (
+        " why the motion is good only if the parts fly as you stated with --after: the flight is used as given, "
+        "although the momentum shows no free flight" in text
+    )

@@ -93,8 +93,34 @@ def test_flights_that_are_given_are_listed_and_td_is_chosen_in_them() -> None:
         0.3,
         0.9,
     )
-    with pytest.raises(RangeError, match="end of the load, give it as `after`"):
+
+
+def test_no_end_of_the_load_is_asked_for_if_the_momentum_denies_every_flight() -> None:
+    with pytest.raises(RangeError, match="shows no free flight at any time") as denied:
         find_longest_flight(make_braked_block(), Settings())
+    assert "`after`" not in str(denied.value)
+    energy = 5 + 90 * TIME
+    with pytest.raises(RangeError, match="end of the load, give it as `after`"):
+        find_longest_flight(make_table(TIME, energy), Settings())
+
+
+@pytest.mark.parametrize(
+    ("given", "names"),
+    [
+        ({"after": 0.3}, "`after`"),
+        ({"after": 0.3, "landing": 0.9}, "`after` and `landing`"),
+    ],
+)
+def test_a_flight_that_only_the_user_states_is_the_reason_for_the_verdict(
+    given: dict[str, float], names: str
+) -> None:
+    answer = suggest_in_history(make_braked_block(), 0.8, Settings(**given))  # type: ignore[arg-type]
+    assert answer.decision
+    assert answer.decision.verdict == "use with care"
+    assert answer.decision.reason.startswith(
+        f"the motion is good only if the parts fly as you stated with {names}: the flight is used as given, although "
+        "the momentum shows no free flight at td = 0.8"
+    )
 
 
 def test_a_message_advises_nothing_that_was_given() -> None:

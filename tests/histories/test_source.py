@@ -16,7 +16,12 @@ import pytest
 from d2rpick.base.errors import FormatError
 from d2rpick.histories.formats import READERS
 from d2rpick.histories.opening import Selection, open_run
-from d2rpick.histories.source import expand, find_later_legs, open_files
+from d2rpick.histories.source import (
+    expand,
+    find_later_legs,
+    has_next_leg,
+    open_files,
+)
 from tests.command import read_refusal
 from tests.computed import locate_stored
 from tests.hdf5_files import plain, write_hdf5
@@ -212,3 +217,24 @@ def test_a_td_that_only_a_later_leg_reaches_names_it() -> None:
     assert first.replace("T01", "T02") in read_refusal(
         "suggest", "--td", "0.4", "--part", "box", first
     )
+
+
+@pytest.mark.parametrize("suffix", ["", ".gz"])
+def test_a_radioss_history_has_a_next_leg_only_if_the_next_number_exists(
+    suffix: str, tmp_path: Path
+) -> None:
+    for name in (
+        "runT01",
+        f"runT02{suffix}",
+        "runT09.gz",
+        "runT10",
+        "table1",
+        "table2",
+    ):
+        (tmp_path / name).touch()
+    followed = [
+        name
+        for name in ("runT01", f"runT02{suffix}", "runT09.gz", "runT10", "table1")
+        if has_next_leg(str(tmp_path / name))
+    ]
+    assert followed == ["runT01", "runT09.gz"]

@@ -82,10 +82,10 @@ def test_read(file: str) -> None:
         )
     assert history.complete is not file.endswith(".head16000")
     notes = expected["notes"].split("; ") if expected["notes"] else []
-    assert len(history.notes) == len(notes)
-    assert all(
-        phrase in note for note, phrase in zip(history.notes, notes, strict=True)
-    )
+    # Some files are restart segments of a run whose later segments lie beside them.
+    of_file = [note for note in history.notes if "in the same folder" not in note]
+    assert len(of_file) == len(notes)
+    assert all(phrase in note for note, phrase in zip(of_file, notes, strict=True))
 
 
 @pytest.mark.parametrize("file", REFUSED)

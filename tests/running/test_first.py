@@ -127,7 +127,11 @@ def test_the_check_says_that_it_does_not_know_these_times(tmp_path: Path) -> Non
         ),
         (CONTACT, {"wait": 0.4 * PERIOD}, "below 0.00497, half of a known period"),
         (CONTACT, {"parts": (1, 77)}, "part 77: no elements"),
-        (CONTACT, {"parts": None}, "keeps no body off; name them with `parts`"),
+        (
+            CONTACT,
+            {"parts": None},
+            r"deactivates no rigid body \(/RBODY/OFF\); name them with `parts`",
+        ),
     ],
 )
 def test_what_cannot_be_done_is_refused_in_one_line(

@@ -25,7 +25,7 @@ from d2rpick.vibration.measures import TOLERATED_GROWTH
 from d2rpick.vibration.model import NOTHING_KEPT
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from numpy.typing import NDArray
 
@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     from d2rpick.choice.pair.candidates import Candidate, Judged
     from d2rpick.choice.pair.moving_apart import MovingApart
     from d2rpick.choice.pair.situation import Situation
-    from d2rpick.flight.flight import Flight
     from d2rpick.histories.history import History, Samples
 
 # Deformation errors that exceed the smallest error by at most this are treated as equal [-].
@@ -67,6 +66,10 @@ _FEW_STATES: Final = 20
 _NAMED: Final = 5
 _WRONG_BY_MORE: Final = "the vibration after td is wrong by more than"
 _MORE_OFTEN: Final = "write the energies more often"
+_NAME_PARTS: Final = "name the parts to be switched with `parts`"
+_VERIFY_PARTS: Final = (
+    "judge the pair with d2rpick verify by the energy of its parts (`parts`)"
+)
 CHOOSE_TIMES_IN_FLIGHT: Final = "choose tr and td in one flight"
 _CORRECT_THE_DECK: Final = "correct the deck, and run the reference again"
 _CHECK_GIVEN_TIMES: Final = (
@@ -74,7 +77,8 @@ _CHECK_GIVEN_TIMES: Final = (
     "or let the evidence decide, without `after` and `landing`"
 )
 # End of the advice on a pair, which is omitted if a finished switched run is already available.
-_OR_COMPARE: Final = ", or compare with a finished switched run"
+_COMPARE: Final = "compare with a finished switched run"
+_OR_COMPARE: Final = f", or {_COMPARE}"
 
 
 def rank_candidates(
@@ -363,11 +367,18 @@ class Quality(NamedTuple):
         return tuple(cause.reason for cause in self.causes)
 
 
-def _explain_uncertain_flight(flight: Flight) -> Cause:
+def _explain_uncertain_flight(situation: Situation) -> Cause:
     """Return why a flight is uncertain: what contradicts the times given by the user, or what evidence is missing."""
+    flight = situation.flight
     if flight.source == "given" and flight.doubts:
+        settings = situation.settings
+        times = (("`after`", settings.after), ("`landing`", settings.landing))
+        given = " and ".join(name for name, time in times if time is not None)
+        condition = (
+            f"the motion is good only if the parts fly as you stated with {given}"
+        )
         return Cause(
-            flight.doubts[-1],
+            f"{condition}: {flight.doubts[-1]}",
             _CHECK_GIVEN_TIMES,
             kind="the evidence contradicts the flight that was given",
         )
@@ -405,7 +416,7 @@ def grade_pair(
     ``best_residual`` is the residual of the best tr at this td [-]; None if it is unknown or if this is the best tr.
     """
     flight = situation.flight
-    uncertain = () if flight.certain else (_explain_uncertain_flight(flight),)
+    uncertain = () if flight.certain else (_explain_uncertain_flight(situation),)
     outside = list_times_outside_flight(situation, best.tr)
     ruined = [
         *(Cause(fault, CHOOSE_TIMES_IN_FLIGHT) for fault in outside),
@@ -480,11 +491,11 @@ def _describe_unknown_direction(situation: Situation) -> Cause:
             kind=unknown,
         )
     for_modes = _describe_cure_for_modes(situation)
-    if not cures or for_modes != _MORE_OFTEN:
+    if for_modes and (not cures or for_modes != _MORE_OFTEN):
         cures.append(for_modes)
     return Cause(
         f"{unknown}{why}",
-        f"{', '.join(cures)}{_OR_COMPARE}",
+        f"{', '.join(cures)}{_OR_COMPARE}" if cures else _COMPARE,
         kind=unknown,
     )
 
@@ -492,17 +503,28 @@ def _describe_unknown_direction(situation: Situation) -> Cause:
 def omit_comparison(quality: Quality) -> Quality:
     """Return the grades without the advice to compare with a switched run, for use after this comparison."""
 
-    def omit(grade: Grade) -> Grade:
-        causes = [
-            cause._replace(cure=cause.cure.removesuffix(_OR_COMPARE))
-            for cause in grade.causes
-        ]
+    def omit(cure: str) -> str:
+        return _MORE_OFTEN if cure == _COMPARE else cure.removesuffix(_OR_COMPARE)
+
+    return _edit_cures(quality, omit)
+
+
+def name_parts_in_verify(quality: Quality) -> Quality:
+    """Return the grades for a check, which has no option for parts: its cure names the command that has one."""
+    return _edit_cures(quality, lambda cure: cure.replace(_NAME_PARTS, _VERIFY_PARTS))
+
+
+def _edit_cures(quality: Quality, edit: Callable[[str], str]) -> Quality:
+    """Return the grades with every cure replaced by what ``edit`` returns for it."""
+
+    def edit_grade(grade: Grade) -> Grade:
+        causes = [cause._replace(cure=edit(cause.cure)) for cause in grade.causes]
         return grade._replace(causes=tuple(causes))
 
     return quality._replace(
-        motion=omit(quality.motion),
-        vibration=omit(quality.vibration),
-        alone=omit(quality.alone),
+        motion=edit_grade(quality.motion),
+        vibration=edit_grade(quality.vibration),
+        alone=edit_grade(quality.alone),
     )
 
 
@@ -530,15 +552,18 @@ def _ask_for_more_states(situation: Situation) -> Iterator[str]:
 
 
 def _describe_cure_for_modes(situation: Situation) -> str:
-    """Return the cure that would show the modes of the vibration: other parts or more states."""
-    other_parts = situation.together.not_chosen.parts
+    """Return the cure that would show the modes of the vibration: other parts or more states.
+
+    It is empty if all other vibrating parts are springs or the like, whose energy a choice of parts would not add.
+    """
+    other_parts = situation.parts_to_add
     if situation.history.parts is None and not other_parts:
-        return "name the parts to be switched with `parts`, if the files contain parts"
+        return f"{_NAME_PARTS}, if the files contain parts"
     if other_parts:
         names = list_names([part.name for part in other_parts], most=_NAMED)
         vibrates = "it vibrates" if len(other_parts) == 1 else "they vibrate"
         return f"also make {names} rigid, because {vibrates} together with the chosen parts"
-    return _MORE_OFTEN
+    return "" if situation.together.not_chosen.parts else _MORE_OFTEN
 
 
 def _describe_wrong_tr(

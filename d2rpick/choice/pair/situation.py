@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from d2rpick.flight.margin import Margin
     from d2rpick.flight.position_error import Bodies
     from d2rpick.histories.history import History, Samples
+    from d2rpick.histories.names import Part
     from d2rpick.vibration import SignedModel
     from d2rpick.vibration.identify import Identification
     from d2rpick.vibration.modal_span import ModalWindow
@@ -199,6 +200,18 @@ class Situation:
     def together(self) -> PartsTogether:
         """Parts that vibrate together in the flight."""
         return PartsTogether(self.history, self.flight)
+
+    @cached_property
+    def parts_to_add(self) -> tuple[Part, ...]:
+        """Parts that vibrate together with the chosen parts, were not chosen, and can become rigid too.
+
+        Springs and dampers are not among them, because their energy would be left out if they were chosen.
+        """
+        springs = {part.id for part in self.history.evidence.springs}
+        kept = springs.union(self.settings.kept_deformable)
+        return tuple(
+            part for part in self.together.not_chosen.parts if part.id not in kept
+        )
 
     @cached_property
     def expected_margin(self) -> Margin:

@@ -265,14 +265,12 @@ def read_observations(folder: str) -> tuple[Observation, ...]:
         raise DeckError(
             f"{folder}: a file, the folder of one run was expected; give the folder that contains it"
         )
-    decks = find_main_decks(folder)
+    decks = find_main_decks(
+        folder, "give the folder that contains the deck and the listings of one run"
+    )
     if len(decks) != 1:
-        if decks:
-            count = f"{len(decks)} main decks were found"
-        else:
-            count = "no main deck was found"
         raise DeckError(
-            f"{folder}: {count}, exactly one was expected; give the folder of one run"
+            f"{folder}: {len(decks)} main decks were found, exactly one was expected; give the folder of one run"
         )
     observations = tuple(
         _read_radioss_observations(decks[0])

@@ -24,7 +24,7 @@ from d2rpick.histories.source import Source
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Mapping
 
-    from d2rpick.deck.model import Inventory
+    from d2rpick.deck.model import Formulation, Inventory
     from d2rpick.deck.source import SourceFile
 
 # Cost of an element per cycle [us]; each integration point of a shell after the first adds the cost "point".
@@ -74,6 +74,30 @@ class Weights:
                 f"element_share is {self.element_share:g}, a number above 0 and up to 1 was expected"
             )
         _check_weight("rigid_node", self.rigid_node)
+
+    @cached_property
+    def _scale_of_built_in(self) -> float:
+        """Median ratio of these weights to the built-in weights of the same classes [-]; 0 if no class is common."""
+        common = [name for name in self.per_element if name in MEASURED]
+        ratios = sorted(self.per_element[name] / MEASURED[name] for name in common)
+        if not ratios:
+            return 0.0
+        middle = len(ratios) // 2
+        return (ratios[middle] + ratios[-middle - 1]) / 2
+
+    def find_weight(self, formulation: Formulation) -> float | None:
+        """Return the cost of an element; None if neither the formulation nor the class of its cost has a weight."""
+        weight = self.per_element.get(formulation.name)
+        if weight is None and formulation.cost is not None:
+            weight = self.per_element.get(formulation.cost)
+        return weight
+
+    def scale_built_in_weight(self, formulation: Formulation) -> float | None:
+        """Return the built-in cost of an element, scaled to these weights; None if one of them is unknown."""
+        built_in = MEASURED.get(formulation.cost or "")
+        if built_in is None or not self._scale_of_built_in:
+            return None
+        return built_in * self._scale_of_built_in
 
 
 def _check_weight(name: str, value: float) -> None:
@@ -188,6 +212,23 @@ class CostModel:
                     names[formulation.name] = None
         return tuple(names)
 
+    @property
+    def built_in(self) -> tuple[str, ...]:
+        """Formulations in the deck that the given weights lack, so that built-in weights are scaled for them."""
+        formulations = [
+            self.inventory.formulation(part, kind)
+            for part, counts in self.inventory.counts.items()
+            if part not in self._rigid
+            for kind in counts
+        ]
+        names = {
+            formulation.name: None
+            for formulation in formulations
+            if self.weights.find_weight(formulation) is None
+            and self.weights.scale_built_in_weight(formulation) is not None
+        }
+        return tuple(names)
+
     def _of(self, part: int, counts: Mapping[str, int]) -> Amount:
         """Return the cost of elements of a part that are given as counts by class."""
         if part in self._rigid:
@@ -196,9 +237,9 @@ class CostModel:
         unknown = list[str]()
         for kind, count in counts.items():
             formulation = self.inventory.formulation(part, kind)
-            weight = self.weights.per_element.get(formulation.name)
-            if weight is None and formulation.cost is not None:
-                weight = self.weights.per_element.get(formulation.cost)
+            weight = self.weights.find_weight(formulation)
+            if weight is None:
+                weight = self.weights.scale_built_in_weight(formulation)
             if weight is None:
                 unknown.append(formulation.name)
             else:
@@ -218,9 +259,12 @@ class CostModel:
             return Share(None, f"not all elements are known: {self.inventory.notes[0]}")
         unknown = sorted({*amount.unknown, *self.total.unknown})
         if unknown:
+            names = ", ".join(unknown)
+            if self.weights.file:
+                lack = f"{self.weights.file.name} has no weight for {names}"
+                return Share(None, f"{lack}; add one under [per_element]")
             return Share(
-                None,
-                f"no weight is known for {', '.join(unknown)}; give one with `weights`",
+                None, f"no weight is known for {names}; give one with `weights`"
             )
         return Share(value)
 

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
     from d2rpick.choice.question import Reference, Settings
     from d2rpick.deck.model import Gravity, Hold, Inventory
+    from d2rpick.histories.history import History
     from d2rpick.histories.names import Part
     from d2rpick.histories.run import OpenedRun
 
@@ -170,6 +171,23 @@ def warn_about_solver(
         )
 
 
+def warn_about_other_solver(
+    history: History, inventory: Inventory
+) -> Iterator[Caution]:
+    """Yield a warning if one solver wrote the history and the deck is for the other solver."""
+    from d2rpick.deck.printing import SOLVERS  # Imported here to keep start-up fast.
+
+    for name, solver in SOLVERS.items():
+        if name != inventory.solver and history.energy_format in solver.histories:
+            deck = inventory.files[0].name
+            files = ", ".join(history.source)
+            text = f"{files} was written by {solver.title}, but {deck} is a deck of {SOLVERS[inventory.solver].title}"
+            use = (
+                "check that both describe the same model, or give the deck of this run"
+            )
+            yield Caution("deck-of-another-solver", f"{text}; {use}")
+
+
 def warn_about_left_rigid(run: OpenedRun, inventory: Inventory) -> Iterator[Caution]:
     """Yield a warning if parts that deform in the history are rigid in the deck."""
     left_rigid = inventory.left_rigid
@@ -190,6 +208,11 @@ def warn_about_cost(model: CostModel, *, used: bool = True) -> Iterator[Caution]
     if used and model.assumed:
         taken = f"the cost of {', '.join(model.assumed)} was not measured; the cost of a similar formulation is used"
         yield Caution("weights-by-analogy", taken)
+    if used and model.built_in:
+        source = model.weights.file.name if model.weights.file else "`weights`"
+        lack = f"{source} has no weight for {', '.join(model.built_in)}"
+        scaled = "the built-in weights are used, scaled to the given ones"
+        yield Caution("built-in-weights", f"{lack}; {scaled}")
 
 
 def _describe_differing(differing: Sequence[Part], inventory: Inventory) -> str:
@@ -234,6 +257,7 @@ def add_deck_to_settings(
     doubts_of_parts = (
         *warn_about_solver(ids, inventory),
         *warn_about_left_rigid(reference.run, inventory),
+        *warn_about_other_solver(reference.history, inventory),
     )
     ruined = tuple(
         RUINS[code]
@@ -241,7 +265,12 @@ def add_deck_to_settings(
         if code in RUINS
     )
     history = reference.history
-    settings = replace(settings, kept_off=inventory.kept_off, ruined=ruined)
+    settings = replace(
+        settings,
+        kept_off=inventory.kept_off,
+        kept_deformable=_list_parts_kept_deformable(inventory),
+        ruined=ruined,
+    )
     if not history.parts:
         why = "name the switched parts with `parts`"
         if settings.cost_share is None:
@@ -271,6 +300,15 @@ def add_deck_to_settings(
             Caution("cost-unknown", f"the CPU time is not estimated: {share.reason}")
         )
     return with_cost, tuple(doubts)
+
+
+def _list_parts_kept_deformable(inventory: Inventory) -> tuple[int, ...]:
+    """Return the springs, and the parts whose material or solids a rigid body does not allow."""
+    return tuple(
+        part
+        for part, data in inventory.parts.items()
+        if part in inventory.springs or data.unswitchable or not data.section.turns
+    )
 
 
 def add_surroundings(run: OpenedRun, inventory: Inventory | None) -> OpenedRun:

@@ -30,6 +30,7 @@ from d2rpick.choice.parts.deck_of_run import (
     warn_about_titles,
 )
 from d2rpick.choice.parts.switchable_parts import (
+    KEEP,
     PartRow,
     RunFacts,
     collect_facts,
@@ -402,7 +403,12 @@ class _SetComparison:
             if self.model
             else None
         )
-        settings = replace(self.settings, bodies=bodies, placement=self.placement)
+        settings = replace(
+            self.settings,
+            bodies=bodies,
+            placement=self.placement,
+            kept_deformable=tuple(row.id for row in self.rows if row.verdict == KEEP),
+        )
         if isinstance(times, tuple):
             verdict = verify_run(reference, *times, settings)
             situation = verdict.situation

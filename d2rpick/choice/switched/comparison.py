@@ -267,7 +267,12 @@ def _check_number_of_states(
         short = min(reference, switched, key=lambda history: history.end)
         name = ", ".join(short.source)
         last = float(short.time[-1])
-        if last <= td:
+        if last == td:
+            raise RangeError(
+                f"{name}: the record ends at {last:g}, while the parts are still rigid, so no state after td can be "
+                "compared; give a finished switched run with all its restart segments"
+            )
+        if last < td:
             raise RangeError(
                 f"{name}: ends at {last:g}, not after td {td:g}; give the later restart segments too"
             )

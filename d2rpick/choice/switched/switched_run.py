@@ -295,12 +295,16 @@ def _warn_about_deforming(
 
 
 class _AbsentWindow(NamedTuple):
-    """A window [time] in which the ``rigid`` parts have no energies; ``whole`` is True if no other part deforms."""
+    """A window [time] in which the ``rigid`` parts have no kinetic energy.
+
+    ``whole`` is True if no other part deforms, ``is_frozen`` if the rigid parts keep a deformation.
+    """
 
     start: float
     end: float
     rigid: str
     whole: bool
+    is_frozen: bool = True
 
     @property
     def caution(self) -> Caution:
@@ -339,8 +343,28 @@ def _find_absent_windows(reference: Reference) -> tuple[_AbsentWindow, ...]:
             if is_rigid
         ]
         deform = ~rigid & (np.ptp(energies[states], axis=0) > rounding)
-        windows.append(_AbsentWindow(start, end, list_names(names), not deform.any()))
+        is_frozen = bool(energies[states][:, rigid].max(initial=0.0) > rounding)
+        whole = not deform.any()
+        windows.append(_AbsentWindow(start, end, list_names(names), whole, is_frozen))
     return tuple(windows)
+
+
+def refuse_partly_rigid(reference: Reference, start: float | None, td: float) -> None:
+    """Raise RangeError if some of the chosen parts were rigid at some time from the start of the flight to td [time].
+
+    Parts that rest have no kinetic energy either, but no frozen deformation. If ``start`` is unknown, the test begins
+    at the start of the record.
+    """
+    earliest = reference.history.start if start is None else start
+    for window in _find_absent_windows(reference):
+        overlaps = window.end > earliest and window.start < td
+        if overlaps and window.is_frozen and not window.whole:
+            span = f"from {window.start:.6g} to {window.end:.6g}"
+            source = ", ".join(reference.history.source)
+            raise RangeError(
+                f"{source}: this is a switched run: these parts were rigid {span}: {window.rigid}; choose times from "
+                "the reference run, and compare this one with it (d2rpick verify)"
+            )
 
 
 def _find_frozen_windows(history: History) -> Iterator[_AbsentWindow]:

@@ -5,9 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
-from d2rpick.base.errors import RangeError
+from d2rpick.base.errors import COPY_AGAIN, RangeError
 from d2rpick.choice.parts.margins import find_margin
-from d2rpick.flight.flight import Flight, find_all_seen, list_witnesses
+from d2rpick.flight.flight import (
+    NEVER_FLIES,
+    Flight,
+    denies_every_flight,
+    find_all_seen,
+    list_witnesses,
+)
 from d2rpick.flight.window import list_moments
 from d2rpick.histories.digits import round_down_as_read, sum_times_as_read
 
@@ -57,6 +63,14 @@ def find_longest_flight(
             cure = "name parts that nothing holds"
         elif settings.after is not None:
             cure = "give `td`"
+        elif not history.complete:
+            reason = (
+                f"{reason}: the record ends early, at {history.end:.6g}, within a state"
+            )
+            cure = COPY_AGAIN
+        elif denies_every_flight(history):
+            reason = f"{reason}: {NEVER_FLIES}"
+            cure = "run it without switching, or write the momenta of the parts and choose those that fly"
         else:
             cure = "if you know the end of the load, give it as `after`"
         raise RangeError(f"{', '.join(history.source)}: {reason}; {cure}")

@@ -24,6 +24,7 @@ from d2rpick.choice.switched.switched_run import (
     DoneWindow,
     find_done_windows,
     prepare_switched_history,
+    refuse_partly_rigid,
 )
 from d2rpick.choice.td.flights import MIN_RIGID, compute_last_td, find_flights
 from d2rpick.flight.internal_energy import round_off
@@ -304,6 +305,7 @@ def _suggest_window(
     # The energy alone may not show the end of the flight, so the margin is kept before the listed end.
     window = row.start, compute_last_td(row.end, row.margin.time)
     reference.history.check(*window, subject=f"flight {row.number},")
+    refuse_partly_rigid(reference, *window)
     answer = suggest_in_run(reference, window, flight_settings, since=landed)
     known_flight = answer.situation.flight
     row = row._replace(answer=answer)
