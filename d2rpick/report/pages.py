@@ -409,7 +409,7 @@ def plan_page(
     """
     cards = [_build_window_card(row, answer) for row in answer.supported]
     cards = cards or [page.build_refusal("No window of this run can be recommended.")]
-    caption = "Internal energy with the flights, and below it the rigid windows with their numbers"
+    caption = "Internal energy with the flights, and above it the rigid windows with their numbers"
     files = [
         *page.list_digests(run.files),
         *page.list_digests_of_settings(answer.settings),

@@ -457,13 +457,13 @@ def _name_step_without_flight(history: History, question: RepeatedQuestion) -> s
         history.time.size, history.start, history.end
     )
     line = write_command(question, "info")
-    look = "see what the run has to write"
+    look = f"see what the run has to write with {line}"
     if not denies_every_flight(history):
-        return f"{more}{look} with {line}, or give the end of the load as --after"
+        return f"{more}{look}, or give the end of the load as --after"
     no_pair = f"{more}{name_lack_of_pairs(question)}: {NEVER_FLIES}"
     if any(momenta.parts for momenta in history.momenta):
         return f"{no_pair}; run it without switching"
-    return f"{no_pair}; {look} to show whether single parts fly, with {line}"
+    return f"{no_pair}; to find out whether single parts fly, {look}"
 
 
 def _name_step_if_flights_are_short(question: RepeatedQuestion) -> str:
