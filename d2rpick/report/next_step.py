@@ -234,7 +234,8 @@ def ask_for_states_that_show_flight(states: int, start: float, end: float) -> st
     if states >= ENOUGH_STATES:
         return ""
     interval = (end - start) / ENOUGH_STATES
-    return f"write the states every {interval:.2g} or more often, because {states} states may miss a flight; otherwise "
+    more = f"write the states every {interval:.2g} or more often"
+    return f"{more}, because {states} states may miss a flight; if no flight is found even then, "
 
 
 def name_lack_of_pairs(question: RepeatedQuestion) -> str:

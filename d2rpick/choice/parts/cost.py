@@ -78,12 +78,11 @@ class Weights:
     @cached_property
     def _scale_of_built_in(self) -> float:
         """Median ratio of these weights to the built-in weights of the same classes [-]; 0 if no class is common."""
+        from statistics import median  # Imported here to keep start-up fast.
+
         common = [name for name in self.per_element if name in MEASURED]
-        ratios = sorted(self.per_element[name] / MEASURED[name] for name in common)
-        if not ratios:
-            return 0.0
-        middle = len(ratios) // 2
-        return (ratios[middle] + ratios[-middle - 1]) / 2
+        ratios = [self.per_element[name] / MEASURED[name] for name in common]
+        return median(ratios) if ratios else 0.0
 
     def find_weight(self, formulation: Formulation) -> float | None:
         """Return the cost of an element; None if neither the formulation nor the class of its cost has a weight."""
