@@ -400,7 +400,7 @@ def is_used(
     given_values: Mapping[str, Any],
     all_values: Mapping[Any, Any],
 ) -> bool:
-    """Return True if a setting applies, given the options with ``given_values`` and all options in ``all_values``."""
+    """Return True if an option applies to the options of the user (``given_values``) and of all (``all_values``)."""
     if any(name in given_values for name in getattr(option, "instead_of", ())):
         return False
     if option.name in CARDS and (

@@ -194,7 +194,10 @@ class Laws:
         return find_longest_window(self.fit, at, TOLERANCE * self.extent + self.noise)
 
     def _weights_across(self, first: int, last: int) -> Iterator[Samples]:
-        """Yield possible weights (3,) along an axis, from the momentum perpendicular to a load of fixed direction."""
+        """Yield possible forces of gravity (3,), each along a coordinate axis, beside a load of fixed direction.
+
+        They explain the momentum perpendicular to this load, which the load does not change.
+        """
         if last - first < FEWEST or not self.mass > 0:
             return
         time = self.fit.time[first : last + 1]

@@ -417,7 +417,7 @@ class Bodies:
 
     @property
     def limit(self) -> float:
-        """Return the largest acceptable position error [length], the smallest one of all bodies with moving parts."""
+        """Return the largest acceptable position error [length]: the smallest limit of any body with moving parts."""
         return min(
             (drift.limit for drift in self._known if drift.place.any()), default=np.inf
         )

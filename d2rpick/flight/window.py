@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 # Initial tolerance for deviations from free flight, relative to the range over the record [-].
-# A contact exceeds the initial tolerance at once.
+# During a contact, the deviation exceeds this tolerance immediately.
 TOLERANCE = 1e-3
 # _TIGHTER: factor by which the tolerance is repeatedly reduced, as long as the window length hardly changes [-].
 # With a smaller tolerance, windows of other smooth motions shrink to less than half, but windows of flights do not.

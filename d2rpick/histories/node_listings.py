@@ -64,7 +64,7 @@ def _read_database(database: Legs, wanted: set[int]) -> NodeMotion | None:
 def read_listed_nodes(
     sources: Sequence[Source], wanted: Collection[int]
 ) -> NodeMotion | None:
-    """Return the motion of the wanted nodes that all files, the restart segments of one run, contain.
+    """Return the motion of those ``wanted`` nodes that occur in each file; the files are restart segments of one run.
 
     Raises
     ------

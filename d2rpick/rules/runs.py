@@ -481,7 +481,7 @@ def _find_left_rigid_parts(
 def _report_unknown_nodes(case: RunCase) -> Iterator[Objection]:
     """D2R406 and D2R407 check what rigid walls and initial velocities do to the nodes of rigid bodies. They evaluate
     node groups defined by nodes, parts and subsets, and the distance from a wall. They do not evaluate other groups,
-    nodes moved by /TRANSFORM, and ids of a //SUBMODEL.
+    nodes moved by /TRANSFORM, or ids inside a //SUBMODEL.
 
     Fix: Define the group by /GRNOD/NODE, /GRNOD/PART or /GRNOD/SUBSET, or check walls and velocities yourself.
     """
