@@ -272,7 +272,7 @@ def read_settings(
     Raises
     ------
     ConfigurationError
-        For a key that is no option, or a value that its option does not allow.
+        For a key that is not an option, or a value that its option does not allow.
     """
     values = {
         option: _read_value(ctx, option, value, position)
