@@ -96,7 +96,7 @@ class PairVerdict(AnswerAtTd):
 
     @cached_property
     def decision(self) -> Decision:
-        """Verdict on the pair, with its reason and cure."""
+        """Verdict on the pair, with the reason and the remedy."""
         decision = self._decide(None)
         if decision.grade == POOR:
             decision = self._decide(self.better)
@@ -629,7 +629,7 @@ def _find_saving_pair(situation: Situation) -> Pair | None:
 
 def _examine_anew(situation: Situation, td: float) -> Situation:
     """Examine the same record at another td in the same way as at a td given by the user."""
-    # The oscillator is fitted again, but the slow search for the reason of its refusal is skipped.
+    # The oscillator is fitted again, but the slow search for the reason for its rejection is skipped.
     quick = situation.evidence.span is None
     return examine_td(situation.history, td, situation.settings, quick=quick)
 

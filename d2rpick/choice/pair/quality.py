@@ -191,7 +191,7 @@ def order_by_quality(
     is_off: NDArray[np.bool_],
     room: Samples,
 ) -> NDArray[np.intp]:
-    """Return the order of the candidates, group by group. The best candidates, which are equally good, come first.
+    """Return the order of the candidates, group by group; in each group, the best candidates come first.
 
     The best candidates of a group are the good ones. If there is none, they are the candidates whose error exceeds the
     smallest one by at most ``room``, shape (groups,), or whose error lies within the band of the best candidate. They
