@@ -12,7 +12,6 @@ from d2rpick.report.tables import make_positional, quote_shell_line
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from d2rpick.choice.answers import PairSuggestion
     from d2rpick.choice.pair.candidates import Pair
     from d2rpick.choice.pair.decision import Decision
     from d2rpick.choice.pair.situation import Situation
@@ -27,6 +26,8 @@ _SOME_NODE: Final = "1001"
 # Placeholders for the main deck in a command if the user has to name it, and for the folder of its copy.
 _SOME_DECK: Final = "DECK"
 _SOME_HISTORY: Final = "HISTORY"
+# Placeholder for the files of a reference run in a command that compares it with a switched run.
+_SOME_REFERENCE: Final = "REFERENCE"
 _FOLDER: Final = "switched"
 # Word for the parts that fly together, as in `d2rpick.flight.momentum`, which is slow to import.
 _FLYING: Final = "flying"
@@ -250,12 +251,51 @@ def name_lack_of_pairs(question: RepeatedQuestion) -> str:
     return f"{_NO_PAIR} with {list_names(limits)} ({values} may allow one)"
 
 
-def name_way_out_of_run(answer: PairSuggestion, question: RepeatedQuestion) -> str:
+def name_step_after_flight(
+    situation: Situation, decision: Decision | None, question: RepeatedQuestion
+) -> str:
+    """Return the step after a comparison of all td of a flight, none of which has a usable pair.
+
+    It leads to the other flights or, if there are none, out of the run; without any flight, to the lacking output.
+    """
+    # Imported here to keep start-up fast.
+    from d2rpick.choice.td.flights import has_other_flights
+
+    if situation.flight.start is None:
+        return name_step_without_flight(situation.history, question)
+    if has_other_flights(situation.history, situation.settings, situation.td):
+        line = write_command(question, "plan")
+        return (
+            f"no pair of this flight can be used; compare the other flights with {line}"
+        )
+    return name_way_out_of_run(situation, decision, question)
+
+
+def name_step_without_flight(history: History, question: RepeatedQuestion) -> str:
+    """Return the step if no flight is found; the end of the load is asked for unless the momentum shows no flight."""
+    # Imported here, because a card without a history needs no numpy.
+    from d2rpick.flight.flight import NEVER_FLIES, denies_every_flight
+
+    more = ask_for_states_that_show_flight(
+        history.time.size, history.start, history.end
+    )
+    line = write_command(question, "info")
+    look = f"see what the run has to write with {line}"
+    if not denies_every_flight(history):
+        return f"{more}{look}, or give the end of the load as --after"
+    no_pair = f"{more}{name_lack_of_pairs(question)}: {NEVER_FLIES}"
+    if any(momenta.parts for momenta in history.momenta):
+        return f"{no_pair}; run it without switching"
+    return f"{no_pair}; to find out whether single parts fly, {look}"
+
+
+def name_way_out_of_run(
+    situation: Situation, decision: Decision | None, question: RepeatedQuestion
+) -> str:
     """Return the step after a comparison of all flights in which no pair can be used.
 
     It leads to other parts or to a change of the input, never to another comparison of the same pairs.
     """
-    situation = answer.situation
     is_chosen = question.parts or "--energy" in question.options
     no_pair = name_lack_of_pairs(question)
     if situation.flight.by_parts and not is_chosen:
@@ -263,13 +303,23 @@ def name_way_out_of_run(answer: PairSuggestion, question: RepeatedQuestion) -> s
         return (
             f"{no_pair} with all parts; judge the parts that fly together with {line}"
         )
-    cure = answer.decision.cure_without_other_times if answer.decision else ""
+    cure = decision.cure_without_other_times if decision else ""
     if cure:
         return f"{no_pair}: {cure}"
     if situation.history.parts:
         line = write_command(question._replace(parts=()), "parts")
         return f"{no_pair} with these parts; find other parts with {line}"
     return f"{no_pair}: run it without switching, or make other parts rigid"
+
+
+def name_step_after_switched_run(question: RepeatedQuestion) -> str:
+    """Return the step after a plan of a finished switched run in which no further window can be used."""
+    switched = [text for name in question.files for text in ("--switched", name)]
+    words = ("d2rpick", "verify", *switched, *question.parts, _SOME_REFERENCE)
+    hint = f"the reference run instead of {_SOME_REFERENCE}"
+    return (
+        f"compare this run with its reference run: {quote_shell_line(words)} ({hint})"
+    )
 
 
 def name_step_after_refusal(
