@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.errors import COPY_AGAIN, list_names
 from d2rpick.choice.pair.grades import DO_NOT_USE
-from d2rpick.deck.beside import find_deck_beside
+from d2rpick.deck.beside import SOME_NODES, SOME_PARTS, find_deck_beside
 from d2rpick.report.tables import make_positional, quote_shell_line
 
 if TYPE_CHECKING:
@@ -20,11 +20,10 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History
     from d2rpick.report.formats import RepeatedQuestion
 
-# Placeholder ids in a command if the user has to name the parts or the nodes, because no file contains them.
-_SOME_PART: Final = "1"
-_SOME_NODE: Final = "1001"
 # Placeholders for the main deck in a command if the user has to name it, and for the folder of its copy.
 _SOME_DECK: Final = "DECK"
+# Largest number of main nodes of a deck that are named in a hint.
+_MOST_NODES: Final = 8
 _SOME_HISTORY: Final = "HISTORY"
 # Placeholder for the files of a reference run in a command that compares it with a switched run.
 _SOME_REFERENCE: Final = "REFERENCE"
@@ -49,11 +48,6 @@ _NEEDS_DECK: Final = (
     f"main deck of the run instead of {_SOME_DECK}; "
     "without it, parts that share nodes become separate rigid bodies"
 )
-
-
-def choose_example_id(kind: str) -> str:
-    """Return a placeholder for the ids of parts ("part") or nodes ("node") that runs as it stands."""
-    return _SOME_NODE if kind == "node" else _SOME_PART
 
 
 class NamedDeck(NamedTuple):
@@ -141,14 +135,15 @@ def name_step_to_card(
     hint = ""
     # The deck names the main nodes of the rigid bodies that contain the parts.
     if is_radioss and not (history.parts and settings.bodies is not None):
-        words = (*words, "--node", _SOME_NODE)
-        hint = f" (main nodes of your rigid bodies instead of {_SOME_NODE})"
+        more_words, hint = _name_bodies(history, question)
+        words = (*words, *more_words)
+        question = _allow_deck(question)
     elif not history.parts:
-        words = (*words, "--part", _SOME_PART)
+        words = (*words, "--part", SOME_PARTS)
         of_radioss = ""
         if not names_solver(history.format):
-            of_radioss = f"; for a Radioss run, --solver radioss --node {_SOME_NODE} instead of --part {_SOME_PART}"
-        hint = f" (ids of your parts instead of {_SOME_PART}; add --merge ID if parts share nodes{of_radioss})"
+            of_radioss = f"; for a Radioss run, --solver radioss --node {SOME_NODES} instead of --part {SOME_PARTS}"
+        hint = f" (ids of your parts instead of {SOME_PARTS}; add --merge ID if parts share nodes{of_radioss})"
     elif needs_deck(history, settings):
         deck = name_deck_of_run(question, _NEEDS_DECK)
         words = (*words, "--deck", deck.name)
@@ -160,6 +155,28 @@ def name_step_to_card(
     else:
         line = write_command(question, command, *words)
     return f"print the cards with {line}{hint}"
+
+
+def _name_bodies(
+    history: History, question: RepeatedQuestion
+) -> tuple[tuple[str, ...], str]:
+    """Return the options that name the rigid bodies on a card for Radioss, and a hint to replace a placeholder.
+
+    The deck next to the history names the bodies of chosen parts. If no part is chosen, its only body is switched.
+    """
+    from d2rpick.deck.suiting import list_main_nodes
+
+    is_excluded = "--no-deck" in question.options
+    deck = None if is_excluded else find_deck_beside(history.source)
+    if deck and question.parts and "--deck" not in question.options:
+        return ("--deck", deck), ""
+    nodes = list_main_nodes(deck) if deck else ()
+    if len(nodes) == 1:
+        return ("--node", str(nodes[0])), ""
+    hint = f"main nodes of your rigid bodies instead of {SOME_NODES}"
+    if nodes:
+        hint += f"; the deck has {list_names([*map(str, nodes)], most=_MOST_NODES)}"
+    return ("--node", SOME_NODES), f" ({hint})"
 
 
 def name_step_with_pair(
