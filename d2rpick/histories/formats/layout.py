@@ -38,6 +38,7 @@ _FORMS = (
 
 # Pattern of the line ``sep=;`` that spreadsheets write above a table; a separator cannot be part of a number.
 _SEP_LINE = re.compile(r'(?i:sep=)(?![\w.+"-])([!-~])')
+_DIGIT = re.compile(r"\d", re.ASCII)
 _DECIMAL_PART = re.compile(r"[+-]?0\d+")
 
 # Number of lines that the first attempt searches for the first row.
@@ -206,10 +207,15 @@ def _find_rows(
         forms = [(separator, decimal) for decimal in ".," if separator != decimal]
     else:
         forms = _FORMS
+    half = len(sample) // 2
+    # A row has a number, so a line without a digit is not a row.
+    sample = [(i, line) for i, line in sample if _DIGIT.search(line)]
     for only_numbers in (False, True):
         best = None
-        best_count = 0 if only_numbers else len(sample) // 2
+        best_count = 0 if only_numbers else half
         for sign, decimal in forms:
+            if best_count == len(sample):
+                break  # No form has more rows.
             if sign and not any(sign in line for _, line in sample):
                 continue
             cells = [(i, split_cells(line, sign)) for i, line in sample]
