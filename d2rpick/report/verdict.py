@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.base.errors import make_printable
-from d2rpick.choice.pair.grades import DO_NOT_USE
+from d2rpick.choice.pair.grades import DO_NOT_USE, GOOD
 from d2rpick.choice.pair.warnings import POOR_RESIDUAL
 from d2rpick.choice.switched.comparison import MOST_MOMENTUM_ERROR
 from d2rpick.report import keys, tables
@@ -142,14 +142,14 @@ def list_next_step(
 
 
 def _name_usable_results(answer: PairVerdict) -> str:
-    """Return the advice to use the switched run, restricted to the motion if its vibration is known to be wrong."""
+    """Return the advice to use the switched run, or only its motion if its vibration is known to be wrong."""
     decision = answer.decision
     switched = answer.switched
     is_kept = switched is None or _keeps_vibration(switched, decision)
-    usable = "the results"
     if decision.allows_only_motion or not is_kept:
-        usable = "only the motion"
-    return f"use {usable} of the switched run"
+        return "use only the motion of the switched run"
+    care = "" if decision.grade == GOOD else " with care"
+    return f"use the results of the switched run{care}"
 
 
 def place_comparison(
@@ -239,7 +239,7 @@ def list_pair_evidence(answer: PairVerdict) -> list[tuple[str, str]]:
     ]
     if best.run_time_share is not None:
         lines.append(("saves", format_saved_share(best.run_time_share)))
-    if exact := format_accuracy(best):
+    if exact := format_accuracy(best, answer.tr_interval):
         lines.append(("tr", exact))
     return lines
 
