@@ -52,7 +52,8 @@ SWITCHED: Final = row(
     Field("source", get_kind("texts", minItems=1), "files of the switched run"),
     Field("energy_frozen", "number", "energy of the switched run at td"),
     Field("energy_td", "number", "energy of the reference run at td"),
-    Field("level_ratio", "number?", "energy_frozen divided by energy_td"),
+    Field("level_ratio", "number?", "energy_frozen divided by energy_td; null if energy_td is only "
+                                      "round-off"),
     Field("end", "number", "end of the comparison, which begins at td"),
     Field("mean_after", "number", "mean energy after td in the switched run"),
     Field("mean_after_reference", "number", "mean energy after td in the reference run"),
@@ -189,7 +190,7 @@ def _contradicts_verdict(switched: Comparison, decision: Decision) -> bool:
 def _list_limited_values(switched: Comparison) -> list[str]:
     """Return the compared values that have limits, each with its limits."""
     compared = []
-    if switched.mean_after_reference > 0:
+    if switched.has_energy:
         ratio = switched.mean_after / switched.mean_after_reference
         limits = f"{100 * switched.min_mean:g}% to {100 * (2 - switched.min_mean):g}%"
         compared.append(

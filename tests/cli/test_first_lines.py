@@ -220,3 +220,19 @@ def test_no_flight_in_a_cut_file_is_a_reason_to_copy_it_again(tmp_path: Path) ->
         assert "--after" not in text
         assert "has to write" not in text
         assert "without switching" not in text
+
+
+@pytest.mark.slow
+def test_a_switched_run_in_which_nothing_vibrated_passes(tmp_path: Path) -> None:
+    """Round-off in the energies of a body that only falls does not show that it deformed while it was rigid."""
+    reference, switched = (str(tmp_path / f"{name}.matsum") for name in "ab")
+    fall = ("rollover", "--drop", "0.2", "--tilt", "25", "--mesh", "4")
+    times = ("--tr", "0", "--td", "0.197104")
+    run(*fall, "-o", reference)
+    run(*fall, *times, "--with-step", "-o", switched)
+    verify = ("verify", "--part", "flying", *times, "--switched", switched, reference)
+    text = join_lines(run(*verify).stdout)
+    assert text.startswith(
+        "comparison passed: momentum error after td 0.00% (limit 5%) use tr = 0, td = 0.197104 "
+    )
+    assert run_json(*verify)["switched"]["level_ratio"] is None
