@@ -1,6 +1,6 @@
 """Find the examples in README.md and docs, and run them as a reader would type them.
 
-``python -m tests.examples`` runs all sessions and writes their output into the pages, or into the pages that are given as
+``python -m tests.examples`` runs all sessions and writes their output into the pages, or only into the pages given as
 arguments.  Check the difference before you commit it.
 """
 
