@@ -73,7 +73,9 @@ class PairVerdict(AnswerAtTd):
 
     ``tr_ok`` and ``td_ok`` are None if the record does not show whether the time is suitable. ``remarks`` are the
     ``reasons`` that are not objections to the pair, or that only repeat that the residual is large. ``computed``
-    contains the comparison with a finished switched run, if there is one.
+    contains the finished switched run, and ``switched`` its comparison with the reference run, if there is such a run.
+    ``tr_interval`` is the output interval of the switched run that contains tr [time]; None if tr was given instead of
+    read from this run.
     """
 
     situation: Situation
@@ -87,6 +89,7 @@ class PairVerdict(AnswerAtTd):
     switched: Comparison | None = None
     health: Health | None = None
     computed: History | None = None
+    tr_interval: float | None = None
 
     @property
     def verified(self) -> bool:

@@ -258,6 +258,8 @@ def list_exceeded_limits(
     """Return the limits in the settings that a candidate exceeds, or for which its value is unknown."""
     exceeded = []
     for limit, value in situation.settings.limits:
+        if limit.is_of_vibration and situation.at_rest:
+            continue
         of_td = limit.quantity not in candidate._fields
         quantity = getattr(situation if of_td else candidate, limit.quantity)
         if quantity is None or not limit.is_kept_by(quantity, value):
