@@ -514,5 +514,5 @@ class RunCase(Case):
         return rigid_legs
 
 
-Objection = tuple[CardField, str]
+PlacedMessage = tuple[CardField, str]
 """A field of the deck, and what is wrong there."""
