@@ -470,7 +470,7 @@ def _report_missing_parts(case: Case) -> Iterator[PlacedMessage]:
     if (
         case.deck.path == STDIN
         and case.sets
-        and not case.parts.materials
+        and not case.parts.material_by_part
         and case.parts.all_known
     ):
         problem = (

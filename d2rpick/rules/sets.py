@@ -271,7 +271,7 @@ def _check_entity_exists(case: Case) -> Iterator[PlacedMessage]:
             header for header in _find_force_headers(case, codes) if header.entno.value
         ]
         entities = read_entities(case.deck, keyword) if headers else None
-        if entities is None or not (entities.all_known and case.whole):
+        if entities is None or not (entities.all_known and case.knows_all_parts):
             continue
         for header in headers:
             if entities.named(header.entno.value) is None:
@@ -378,7 +378,7 @@ def _check_sensor_control(case: Case) -> Iterator[PlacedMessage]:
 
     Fix: Add a *SENSOR_CONTROL with TYPE DEF2RIG and TYPEID equal to SWSET, or choose another CODE.
     """
-    if not case.whole:
+    if not case.knows_all_parts:
         return
     controlled = {
         number

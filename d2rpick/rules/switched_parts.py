@@ -205,7 +205,7 @@ def _check_ids_exist(case: Case) -> Iterator[PlacedMessage]:
 
     Fix: Correct the id, and check the id offsets of *INCLUDE_TRANSFORM.
     """
-    for card in case.sets if case.whole else ():
+    for card in case.sets if case.knows_all_parts else ():
         missing = group_values(
             absent
             for line in card.switched
@@ -240,7 +240,7 @@ def _list_nearest(number: int, parts: DeckParts) -> str:
     from heapq import nsmallest  # Imported here to keep start-up fast.
 
     near = sorted(
-        nsmallest(_NEAREST, parts.materials, key=lambda part: abs(part - number))
+        nsmallest(_NEAREST, parts.material_by_part, key=lambda part: abs(part - number))
     )
     listed = (
         f"{part} {parts.titles[part]!r}" if parts.titles[part] else str(part)
@@ -262,8 +262,10 @@ def _find_absent(line: Switched, parts: DeckParts) -> Iterator[tuple[str, int]]:
             members = parts.members(line.part.value) or ()
         else:
             members = (line.part.value,)
-        yield from (("part", part) for part in members if part not in parts.materials)
-    if line.lead and line.lead.value and line.lead.value not in parts.materials:
+        yield from (
+            ("part", part) for part in members if part not in parts.material_by_part
+        )
+    if line.lead and line.lead.value and line.lead.value not in parts.material_by_part:
         yield "lead part", line.lead.value
 
 

@@ -225,7 +225,7 @@ def _check_sampling(case: Case) -> Iterator[PlacedMessage]:
             )
             why = f"expected at most {limit:g}: {_INTERVALS} intervals in the shortest rigid window"
             yield value.field, f"{problem} ({why}); reduce DT"
-    whole = case.whole or (case.parts.all_known and case.end_time is not None)
+    whole = case.knows_all_parts or (case.parts.all_known and case.end_time is not None)
     if missing and whole:
         problem = (
             f"the deck has no {' and no '.join(missing)}, so its run writes no energies: no times can be chosen from "
