@@ -76,13 +76,16 @@ def extract_kinetic_energy(
     Returns
     -------
     time, energy : array of shape (n,), or None
-        States in the flight [time], [energy]; None if no file contains this energy.
+        States in the flight [time], [energy]; None if no file contains this energy, or if it contains only the fall.
 
     Notes
     -----
     Under constant gravity, the kinetic energy of the centre of mass is a quadratic function of time; damping changes it
     only slowly. Neither causes a spectral line.
     """
+    # Imported here to keep start-up fast.
+    from d2rpick.vibration.hidden_energy import RESOLVED
+
     kinetic = history.evidence.kinetic_energy(flight.parts)
     if kinetic is None:
         return None
@@ -92,4 +95,7 @@ def extract_kinetic_energy(
     if time.size < _FEWEST:
         return None
     since = time - time[0]
-    return time, energy - np.polyval(np.polyfit(since, energy, 2), since)
+    rest = energy - np.polyval(np.polyfit(since, energy, 2), since)
+    # The rounding errors of an energy that does not vibrate must not be read as modes.
+    is_resolved = np.ptp(rest) > RESOLVED * float(np.abs(energy).max())
+    return (time, rest) if is_resolved else None
