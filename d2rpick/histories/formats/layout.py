@@ -266,7 +266,7 @@ def _find_numbers(
 def _find_numbers_in_row(
     cells: list[str], form: Layout, only_numbers: bool
 ) -> tuple[bool, ...]:
-    """Return, for each cell of a row, whether it is a number or marks a missing one; empty if the line is no row."""
+    """Return for each cell of a row whether it is a number or marks a missing value; empty if there is no row."""
     # Most lines have only one cell here, because most of the separators that are tried are wrong.
     if len(cells) < 2:
         return ()

@@ -184,7 +184,7 @@ def _read_plain_text(source: Source, piece: int) -> tuple[Content, str]:
 
 
 def _is_plain(data: bytes) -> bool:
-    """Return True if data are ASCII text without carriage returns and null characters."""
+    """Return True if data are ASCII text without carriage returns or null characters."""
     return data.isascii() and b"\r" not in data and b"\0" not in data
 
 
