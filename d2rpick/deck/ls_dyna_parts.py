@@ -421,7 +421,7 @@ def _read_card_sections(card: Card) -> Iterator[tuple[int, SectionCard]]:
 
 
 def find_element_cards(deck: Deck, *, searched: bool) -> list[Card]:
-    """Return the element cards that may define shared nodes or, if ``searched`` is False, the other element cards."""
+    """Return the element cards in which the nodes of constraints are searched for; the others if not ``searched``."""
     cards = deck.named(*_SEARCHED)
     return [
         card

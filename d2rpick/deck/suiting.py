@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final, NamedTuple
 
+from d2rpick.base.errors import DeckError
 from d2rpick.deck.ls_dyna_parts import (
     DELETING_FLAGS,
     Constraint,
@@ -71,6 +72,16 @@ def find_name_of_files(run: RadiossRun) -> str | None:
     if run.starter and (root := find_root(run.starter.sources[0].name)):
         return root
     return run.legs[0].name if run.legs else None
+
+
+def list_main_nodes(path: str) -> tuple[int, ...]:
+    """Return the main nodes of all rigid bodies of a Radioss deck; empty if the deck cannot be read."""
+    try:
+        run = read_run(path)
+    except DeckError:
+        return ()
+    bodies = run.starter.bodies if run.starter else ()
+    return tuple(dict.fromkeys(body.node.value for body in bodies if body.node.value))
 
 
 def _find_free_ids(deck: Deck) -> tuple[int, int]:

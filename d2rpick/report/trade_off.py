@@ -9,6 +9,7 @@ from d2rpick.choice.pair.quality import EQUALLY_GOOD
 from d2rpick.report import keys, tables
 from d2rpick.report.decision import (
     format_with_number,
+    is_refused,
     list_numbered_reasons,
     list_verdict_lines,
     number_reasons,
@@ -16,8 +17,10 @@ from d2rpick.report.decision import (
 from d2rpick.report.fields import Document, Field, many, maybe, row, write_csv
 from d2rpick.report.next_step import (
     add_step_to_copy,
+    name_step_after_flight,
     name_step_after_refusal,
     name_step_with_pair,
+    name_step_without_flight,
     write_command,
 )
 from d2rpick.report.situation import describe_input
@@ -127,12 +130,19 @@ def list_next_step(
     """Return the next command, which leads to the card of the requested or chosen pair, otherwise to a better pair."""
     offer = trade_off.requested or trade_off.recommended
     decision = trade_off.decide_on(offer) if offer else None
+    situation = offer.answer.situation if offer else trade_off.situation
     if offer is None or offer.tr is None or decision is None:
-        step = f"compare all flights with {write_command(question, 'plan')}"
+        if situation.flight.start is None:
+            step = name_step_without_flight(situation.history, question)
+        else:
+            step = f"compare all flights with {write_command(question, 'plan')}"
     elif decision.verdict == DO_NOT_USE:
-        otherwise = f"compare all flights with {write_command(question, 'plan')}"
+        if "--td-window" in question.times:
+            otherwise = f"compare all flights with {write_command(question, 'plan')}"
+        else:
+            otherwise = name_step_after_flight(situation, decision, question)
         step = name_step_after_refusal(
-            offer.answer.situation, decision.better, question, otherwise, decision
+            situation, decision.better, question, otherwise, decision
         )
     else:
         times = ("--td", f"{offer.td:.6g}")
@@ -185,37 +195,32 @@ def _list_choice_if_td_is_free(
     best = trade_off.recommended
     if best is None or best is requested or best.decision is None:
         return []
+    if is_refused(best.decision):
+        return [("if td is free", "no other td of the range has a usable pair either")]
     return [
         ("if td is free", f"{best.decision.verdict}: {_describe_offer(best)}"),
     ]
 
 
 def list_costs_of_other_offers(trade_off: TradeOff) -> list[tuple[str, str]]:
-    """Describe the drawbacks of a pair with a smaller error and of a pair with a longer rigid time."""
+    """Describe the drawbacks of a pair with a smaller error and of a pair with a longer rigid time.
+
+    A pair that cannot be used is no alternative, so it stands only in the table.
+    """
     best = trade_off.recommended
     if best is None:
         return []
     lines = []
     accurate = trade_off.more_accurate
-    if accurate:
+    if accurate and not is_refused(accurate.decision):
         cost_text = _describe_cost_change(best, accurate)
-        warned = _warn_about_refused(accurate)
-        lines.append(
-            ("smaller error", f"{_describe_error_at(accurate)}{warned} {cost_text}")
-        )
+        lines.append(("smaller error", f"{_describe_error_at(accurate)} {cost_text}"))
     longest = trade_off.start
-    if longest and (longest.rigid_time or 0.0) > (best.rigid_time or 0.0):
+    is_longer = longest and (longest.rigid_time or 0.0) > (best.rigid_time or 0.0)
+    if longest and is_longer and not is_refused(longest.decision):
         cost_text = _describe_cost_change(best, longest)
-        warned = _warn_about_refused(longest)
-        lines.append(("longest", f"{_describe_error_at(longest)}{warned} {cost_text}"))
+        lines.append(("longest", f"{_describe_error_at(longest)} {cost_text}"))
     return lines
-
-
-def _warn_about_refused(offer: Offer) -> str:
-    """Return the verdict in parentheses if a proposed pair cannot be used; otherwise ""."""
-    decision = offer.decision
-    refused = decision is not None and decision.verdict == DO_NOT_USE
-    return f" ({DO_NOT_USE})" if refused else ""
 
 
 def _describe_offer(offer: Offer) -> str:

@@ -19,6 +19,7 @@ from d2rpick.report.decision import (
 from d2rpick.report.fields import Document, Field, get_kind, maybe, row
 from d2rpick.report.next_step import (
     add_step_to_copy,
+    name_step_after_flight,
     name_step_after_refusal,
     name_step_with_pair,
     write_command,
@@ -122,13 +123,13 @@ def list_next_step(
     decision = answer.decision
     situation = answer.situation
     if decision.verdict == DO_NOT_USE:
-        line = write_command(question, "explore", "--td", f"{answer.td:.6g}")
+        if decision.best_of or situation.flight.start is None:
+            otherwise = name_step_after_flight(situation, decision, question)
+        else:
+            line = write_command(question, "explore", "--td", f"{answer.td:.6g}")
+            otherwise = f"compare other td with {line}"
         step = name_step_after_refusal(
-            situation,
-            decision.better,
-            question,
-            f"compare other td with {line}",
-            decision,
+            situation, decision.better, question, otherwise, decision
         )
     elif answer.switched and display.page:
         step = f"{_name_usable_results(answer)}; {display.page} contains the comparison"

@@ -75,7 +75,7 @@ class Severity(StrEnum):
 
     @property
     def rank(self) -> int:
-        """Return 0 for an error, 1 for a warning, 2 for an info."""
+        """Rank of the severity: 0 for error, 1 for warning, 2 for info."""
         return list(Severity).index(self)
 
 

@@ -15,16 +15,14 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 from d2rpick.base.errors import choose_verb, name_units
 from d2rpick.deck.ls_dyna_parts import DELETING_FLAGS, read_merged_bodies
 from d2rpick.rules.base import ERROR, WARNING, Case, Objection, group_values
+from d2rpick.rules.example import Example, make_deck, write_automatic_card
 from d2rpick.rules.rule import (
     BACK,
     PASS,
     THERE,
-    Example,
-    make_deck,
     make_rule_decorator,
     set_failing,
     set_passing,
-    write_automatic_card,
 )
 from d2rpick.rules.switched_parts import find_lead_parts
 

@@ -11,20 +11,22 @@ from d2rpick.deck.ls_dyna_parts import find_element_cards
 from d2rpick.deck.reader import UNKNOWN_KIND, describe_cure, find_cuts
 from d2rpick.deck.switching import SwitchSet, find_misspelt
 from d2rpick.rules.base import BOTH, ERROR, INFO, LS_DYNA, WARNING, Case, Objection
-from d2rpick.rules.rule import (
-    BACK,
+from d2rpick.rules.example import (
     END,
-    GOOD,
     HEAD,
     PARTS,
-    PASS,
-    THERE,
     Example,
     make_deck,
+    write_automatic_card,
+)
+from d2rpick.rules.rule import (
+    BACK,
+    GOOD,
+    PASS,
+    THERE,
     make_rule_decorator,
     set_failing,
     set_passing,
-    write_automatic_card,
 )
 
 if TYPE_CHECKING:

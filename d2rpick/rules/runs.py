@@ -9,17 +9,15 @@ from d2rpick.base.errors import name_units
 from d2rpick.deck.radioss_columns import AFTER_DELAY
 from d2rpick.deck.radioss_files import AT_REST, NOT_FOLLOWED, THROUGH_WALL
 from d2rpick.rules.base import ERROR, INFO, RADIOSS, WARNING, Objection, RunCase
-from d2rpick.rules.rule import (
-    GOOD_RUN,
+from d2rpick.rules.example import (
     WINDOW,
     Example,
-    make_rule_decorator,
     make_run,
-    set_failing,
-    set_passing,
     write_engine_files,
+    write_row,
     write_starter_deck,
 )
+from d2rpick.rules.rule import GOOD_RUN, make_rule_decorator, set_failing, set_passing
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -42,31 +40,24 @@ _KEEPS: Final = (
     .partition("/GRNOD")[0]
     .replace("         7\n", "         7         1\n")
 )  # Starter deck with a rigid body for which Ikrem is 1.
+_NODES: Final = "/GRNOD/NODE/8\nnodes of the box\n" + write_row(1, 2, 3, 4)
+_MAIN: Final = "/GRNOD/NODE/9\nmain node\n" + write_row(1808)
+_PLACES: Final = "/NODE\n" + "".join(
+    write_row(n)[:-1] + write_row(0.1 * n, 0.0, 0.05, width=20) for n in (1, 2, 3, 4)
+)
 # Arguments of `d2rpick replay` for a matsum history in which only the third part deforms.
 _SPRING: Final = "--stiffness 660e3 --mass 31.4 --beta 2 --alpha 50 --v0 6 --t-end 0.3 --dt 1e-3 --write-as matsum"
-
-
-def _write_row(*fields: float | str, width: int = 10) -> str:
-    """Return a line whose fields are right-aligned in columns of the given width."""
-    return "".join(f"{field:>{width}}" for field in fields) + "\n"
-
-
-_NODES: Final = "/GRNOD/NODE/8\nnodes of the box\n" + _write_row(1, 2, 3, 4)
-_MAIN: Final = "/GRNOD/NODE/9\nmain node\n" + _write_row(1808)
-_PLACES: Final = "/NODE\n" + "".join(
-    _write_row(n)[:-1] + _write_row(0.1 * n, 0.0, 0.05, width=20) for n in (1, 2, 3, 4)
-)
 
 
 def _write_wall(added: int, left_out: int = 0, reach: float = 0.0) -> str:
     """Return a rigid wall at z = 0 that acts on nodes within ``reach`` and on group ``added``, not on ``left_out``."""
     text = (
         "/RWALL/PLANE/3\nground\n"
-        + _write_row(0, 0, added, left_out)
-        + _write_row(reach, 0.0, 0.0, width=20)
+        + write_row(0, 0, added, left_out)
+        + write_row(reach, 0.0, 0.0, width=20)
     )
     return (
-        text + _write_row(0.0, 0.0, 0.0, width=20) + _write_row(0.0, 0.0, 1.0, width=20)
+        text + write_row(0.0, 0.0, 0.0, width=20) + write_row(0.0, 0.0, 1.0, width=20)
     )
 
 
@@ -74,8 +65,8 @@ def _write_velocity(group: int, speed: float = 10.0) -> str:
     """Return an /INIVEL that gives this speed to the nodes of a group."""
     return (
         "/INIVEL/TRA/4\nthrown\n"
-        + _write_row(speed, 0.0, 0.0, width=20)[:-1]
-        + _write_row(group)
+        + write_row(speed, 0.0, 0.0, width=20)[:-1]
+        + write_row(group)
     )
 
 
@@ -87,7 +78,7 @@ def _make_run_with(*more: str) -> Example:
 def _make_started_run(state: str, *nodes: int) -> Example:
     """Return a run whose first engine file gives nodes an initial velocity while the body is ``state`` (ON or OFF)."""
     files = write_engine_files(("0.02", state), ("0.2", "OFF"))
-    files["box_0001.rad"] += "/INIV/TRA/X/1\n10.0\n" + _write_row(*nodes)
+    files["box_0001.rad"] += "/INIV/TRA/X/1\n10.0\n" + write_row(*nodes)
     return make_run(files, write_starter_deck(_NODES.replace("NODE/8", "NODE/7")))
 
 
@@ -95,9 +86,9 @@ def _make_wheel_run(
     further_nodes: str = "", members: tuple[int, ...] = (5, 6, 7, 8), part: int = 2
 ) -> Example:
     """Return a run that has a wheel as a second rigid body; the first /RBODY/OFF also lists ``further_nodes``."""
-    mesh = f"/PART/{part}\nwheel\n{_write_row(1, 1)}/SHELL/{part}\n{_write_row(2, 5, 6, 7, 8)}"
-    wheel = f"{mesh}/GRNOD/NODE/6\nwheel\n{_write_row(*members)}"
-    body = "/RBODY/2\nwheel\n" + _write_row(1809, 0, 0, 0, "", 0, 6)
+    mesh = f"/PART/{part}\nwheel\n{write_row(1, 1)}/SHELL/{part}\n{write_row(2, 5, 6, 7, 8)}"
+    wheel = f"{mesh}/GRNOD/NODE/6\nwheel\n{write_row(*members)}"
+    body = "/RBODY/2\nwheel\n" + write_row(1809, 0, 0, 0, "", 0, 6)
     files = {
         **_LEGS,
         "box_0001.rad": _LEGS["box_0001.rad"].replace(
@@ -476,7 +467,7 @@ def _find_left_rigid_parts(
 @set_passing(lambda: [GOOD_RUN, _make_run_with(_NODES, _write_wall(8))])
 @set_failing(
     lambda: [
-        _make_run_with("/GRNOD/BOX/8\nbox\n", _write_row(1), _write_wall(8)),
+        _make_run_with("/GRNOD/BOX/8\nbox\n", write_row(1), _write_wall(8)),
         _make_run_with(_write_velocity(8)),
         _make_run_with(_PLACES, "/TRANSFORM/TRA/1\n", _write_wall(0, 0, 0.1)),
     ]
@@ -490,7 +481,7 @@ def _find_left_rigid_parts(
 def _report_unknown_nodes(case: RunCase) -> Iterator[Objection]:
     """D2R406 and D2R407 check what rigid walls and initial velocities do to the nodes of rigid bodies. They evaluate
     node groups defined by nodes, parts and subsets, and the distance from a wall. They do not evaluate other groups,
-    nodes moved by /TRANSFORM, and ids of a //SUBMODEL.
+    nodes moved by /TRANSFORM, or ids inside a //SUBMODEL.
 
     Fix: Define the group by /GRNOD/NODE, /GRNOD/PART or /GRNOD/SUBSET, or check walls and velocities yourself.
     """
@@ -567,7 +558,7 @@ def _check_velocities(case: RunCase) -> Iterator[Objection]:
 def _make_sensed_run(*lines: str) -> Example:
     """Return a run in which a /SENSOR/TIME with the given lines switches the body."""
     deck = write_starter_deck().replace(
-        _write_row(1808, 0)[:-1], _write_row(1808, 5)[:-1]
+        write_row(1808, 0)[:-1], write_row(1808, 5)[:-1]
     )
     return make_run(
         write_engine_files(("0.2", "")),
@@ -578,10 +569,10 @@ def _make_sensed_run(*lines: str) -> Example:
 @set_passing(
     lambda: [
         GOOD_RUN,
-        _make_sensed_run(_write_row(0.02, width=20), _write_row(0.09, width=20)),
+        _make_sensed_run(write_row(0.02, width=20), write_row(0.09, width=20)),
     ]
 )
-@set_failing(lambda: [_make_sensed_run(_write_row(0.02, 0.09, width=20))])
+@set_failing(lambda: [_make_sensed_run(write_row(0.02, 0.09, width=20))])
 @make_rule_decorator(
     "D2R412",
     WARNING,

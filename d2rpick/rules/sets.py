@@ -10,16 +10,19 @@ from d2rpick.deck.ls_dyna_columns import SENSOR_CONTROL
 from d2rpick.deck.ls_dyna_parts import Entities, read_entities
 from d2rpick.deck.switching import BY_SENSOR, BY_TIME, SwitchHeader, SwitchSet, Unit
 from d2rpick.rules.base import BOTH, ERROR, WARNING, Case, Objection
+from d2rpick.rules.example import (
+    Example,
+    make_deck,
+    write_automatic_card,
+    write_contact,
+)
 from d2rpick.rules.rule import (
     BACK,
     PASS,
     THERE,
-    Example,
-    make_deck,
     make_rule_decorator,
     set_failing,
     set_passing,
-    write_automatic_card,
 )
 
 if TYPE_CHECKING:
@@ -43,6 +46,7 @@ _WALL: Final = (
     "0.0       0.0       0.0\n"
 )
 _CONTROL: Final = "*SENSOR_CONTROL\n         5   DEF2RIG{:10d}        ON\n         3\n"
+_FLOOR: Final = write_contact("SURFACE_TO_SURFACE")
 # Arguments of `d2rpick rollover` for the history of a box that lands on its edge and rattles there.
 _LANDING: Final = "--drop 0.2 --tilt 20 --mesh 4 --ground-stiffness 2e6 --t-end 0.7 --dt 5e-4 --write-as matsum"
 
@@ -66,14 +70,6 @@ def _make_force_deck(
         1, "0.0", rigid=["1"], code=code, delay=time3, contact=entno
     )
     return make_deck(contact + card)
-
-
-def _write_contact(name: str) -> str:
-    zeros = f"{0:10d}" * 8 + "\n"
-    return f"*CONTACT_AUTOMATIC_{name}_ID\n         7floor\n" + 3 * zeros
-
-
-_FLOOR: Final = _write_contact("SURFACE_TO_SURFACE")
 
 
 _with_floor = partial(_make_force_deck, contact=_FLOOR)
@@ -297,13 +293,13 @@ def _check_entity_exists(case: Case) -> Iterator[Objection]:
     lambda: [
         _with_floor(4, 7),
         _make_force_deck(2, 1, contact=_BY_ORDER),
-        _make_force_deck(3, 7, contact=_write_contact("GENERAL") + _WALL),
+        _make_force_deck(3, 7, contact=write_contact("GENERAL") + _WALL),
     ]
 )
 @set_failing(
     lambda: [
-        _make_force_deck(4, 7, contact=_write_contact("GENERAL")),
-        _make_force_deck(2, 7, contact=_write_contact("SINGLE_SURFACE")),
+        _make_force_deck(4, 7, contact=write_contact("GENERAL")),
+        _make_force_deck(2, 7, contact=write_contact("SINGLE_SURFACE")),
     ]
 )
 @make_rule_decorator(

@@ -8,16 +8,14 @@ from d2rpick.base.errors import name_units
 from d2rpick.base.graph import find_reachable
 from d2rpick.deck.ls_dyna_parts import DeckParts, find_element_cards
 from d2rpick.rules.base import BOTH, ERROR, INFO, WARNING, Case, Objection, group_values
+from d2rpick.rules.example import Example, make_deck, write_automatic_card
 from d2rpick.rules.rule import (
     BACK,
     PASS,
     THERE,
-    Example,
-    make_deck,
     make_rule_decorator,
     set_failing,
     set_passing,
-    write_automatic_card,
 )
 
 if TYPE_CHECKING:

@@ -15,21 +15,23 @@ from d2rpick.deck.switching import (
     SwitchWindow,
 )
 from d2rpick.rules.base import BOTH, ERROR, WARNING, Case, Objection, group_values
-from d2rpick.rules.rule import (
-    BACK,
+from d2rpick.rules.example import (
     END,
-    GOOD,
     HEAD,
     PARTS,
-    PASS,
-    THERE,
     Example,
     make_deck,
-    make_rule_decorator,
     make_window,
+    write_automatic_card,
+)
+from d2rpick.rules.rule import (
+    BACK,
+    GOOD,
+    PASS,
+    THERE,
+    make_rule_decorator,
     set_failing,
     set_passing,
-    write_automatic_card,
 )
 
 if TYPE_CHECKING:

@@ -29,7 +29,7 @@ _ORDERS: Final = (3, 5, 7, 9, 11, 13, 17, 21, 27, 35, 45, 57, 71)
 # _CLEARLY_BETTER: more exponentials are preferred if they reduce the prediction error to this fraction or less [-].
 # PERFECT: relative prediction error below which no more exponentials are tried [-].
 _CLEARLY_BETTER, PERFECT = 0.8, 2e-4
-# _BETTER: fraction that replaces _CLEARLY_BETTER if the misfit still contains a spectral line [-].
+# _BETTER: replaces _CLEARLY_BETTER if the misfit with fewer exponentials still contains a spectral line [-].
 # _OF_A_LINE: a misfit contains a spectral line if its largest power is at least this multiple of the mean power [-].
 _BETTER, _OF_A_LINE = 0.97, 16.0
 # Fraction of the record that is fitted to predict the rest of the record [-].

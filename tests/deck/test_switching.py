@@ -6,7 +6,7 @@ import pytest
 
 from d2rpick.deck.ls_dyna_inventory import find_shared_nodes
 from d2rpick.deck.ls_dyna_parts import find_element_cards, read_parts
-from d2rpick.rules.rule import PARTS, write_automatic_card
+from d2rpick.rules.example import PARTS, write_automatic_card
 from tests.decks import list_spans, pad, read, windows
 
 Spans = list[tuple[int | None, float, float | None]]

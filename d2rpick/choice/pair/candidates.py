@@ -462,7 +462,7 @@ def _find_start_at_rest(situation: Situation) -> Moments | None:
 
 
 def _mark_given_as_matches(situation: Situation, moments: Moments) -> Moments:
-    """Set the kind of each tr that coincides with a closest match to "match", as its accuracy is that of a match."""
+    """Set the kind of a given tr to "match" if it coincides with a closest match, because it is just as accurate."""
     is_given = moments.are("given")
     vibration = situation.vibration
     if situation.at_rest or not (is_given.any() and vibration.profile):

@@ -83,6 +83,18 @@ def find_longest_flight(
     return start, latest if longest.source == "energy" and latest > start else end
 
 
+def has_other_flights(history: History, settings: Settings, td: float) -> bool:
+    """Return True if a flight that does not contain ``td`` [time] is long enough for a useful rigid window."""
+    for flight in find_flights(history, settings):
+        start, end = flight.within(history.time)
+        if start <= td <= end:
+            continue
+        latest = compute_last_td(end, find_margin(history, flight, settings).time)
+        if latest - start >= MIN_RIGID * history.duration:
+            return True
+    return False
+
+
 def compute_last_td(end: float, margin: float) -> float:
     """Return the last td that, when rounded for print, is at least ``margin`` before the end of a flight [time]."""
     return round_down_as_read(sum_times_as_read(end, -margin)) if margin else end
