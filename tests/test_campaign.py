@@ -33,6 +33,21 @@ def test_an_answer_follows_what_changes_its_history(relation: str) -> None:
     assert outcomes["read"] > 0
 
 
+@pytest.mark.parametrize(
+    ("relation", "seed", "number"),
+    [
+        # The kinetic energy of the glstat is constant, and the rounding errors of its fit were taken for modes.
+        ("glstat", 8101, 10),
+        # With fewer states, a minimum of the error appears that is as good, but 3e-4 earlier.
+        ("every second state", 8101, 30),
+    ],
+)
+def test_answers_that_once_broke_a_relation_follow_it(
+    relation: str, seed: int, number: int
+) -> None:
+    assert run_case(relation, seed, number) == "read"
+
+
 def test_half_of_the_states_still_show_the_fastest_mode() -> None:
     fewest = RELATIONS["every second state"].fewest_states
     runs = [make_run(Random(seed), fewest) for seed in range(50)]

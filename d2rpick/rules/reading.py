@@ -349,12 +349,12 @@ def _report_disabled(case: Case) -> Iterator[PlacedMessage]:
 def _report_untimed(case: Case) -> Iterator[PlacedMessage]:
     """CODE 1 to 4 switch by the force of a contact or rigid wall, and CODE 5 by a sensor. Restart cards switch when the
     restart begins, and plain cards at the start of the run. A Radioss body may be switched by a sensor other than
-    /SENSOR/TIME. No time on such a card can be compared with an energy history. If the history has the force of the
-    contact or wall (or the part momenta, if the deck has only one contact or wall), d2rpick finds the switching times
-    from it and judges them. d2rpick evaluates a *SENSOR_CONTROL if its *SENSOR_SWITCH depends on the time, or on the
-    magnitude of such a force. It assumes that the parts are rigid while the sensor is on, and deformable while it is
-    off; this was not tested with the solver. If you check restarts together with their main deck, they have times: each
-    restart begins at the ENDTIM of the previous run.
+    /SENSOR/TIME. No time on such a card can be compared with an energy history. If the history contains the force of
+    the contact or wall, d2rpick finds the switching times from this force, and judges them. Part momenta are enough if
+    the deck has only one contact or wall. d2rpick evaluates a *SENSOR_CONTROL if its *SENSOR_SWITCH depends on the
+    time, or on the magnitude of a contact or wall force. It assumes that the parts are rigid while the sensor is on,
+    and deformable while it is off; this was not tested with the solver. If you check restarts together with their main
+    deck, they have times: each restart begins at the ENDTIM of the previous run.
 
     Fix: To have the switches judged, give a history with contact forces or part momenta (--history), check restarts
     together with their main deck, or switch by time (CODE 0).

@@ -259,10 +259,10 @@ def _find_force_headers(case: Case, codes: set[int]) -> Iterator[SwitchHeader]:
     "D2R007", ERROR, "ENTNO names no contact or rigid wall of the deck"
 )
 def _check_entity_exists(case: Case) -> Iterator[PlacedMessage]:
-    """CODE 2 and 4 wait for the force of contact ENTNO, CODE 1 and 3 for the force of rigid wall ENTNO. If it does not
-    exist, it never has a force. ENTNO is the id of *CONTACT_..._ID. Contacts without ids are counted in the order of
-    their definition (no available source confirms this). d2rpick applies this rule only if it could read the whole deck
-    and the deck has parts. Source: vendor keyword data.
+    """CODE 2 and 4 wait for the force of contact ENTNO, CODE 1 and 3 for the force of rigid wall ENTNO. A contact or
+    wall that does not exist never has a force. ENTNO is the id of *CONTACT_..._ID. Contacts without ids are counted in
+    the order of their definition (no available source confirms this). d2rpick applies this rule only if it could read
+    the whole deck and the deck has parts. Source: vendor keyword data.
 
     Fix: Set ENTNO to the id of a contact or rigid wall of the deck.
     """
