@@ -307,7 +307,7 @@ def list_all_measures(answer: PairVerdict) -> dict[str, Any]:
 
 
 def as_csv(answer: PairVerdict, _: DisplayOptions) -> str:
-    """Return one row of CSV with a column for each key that `measures` returns."""
+    """Return one row of CSV with a column for each key that `list_all_measures` returns."""
     values = list_all_measures(answer)
     return tables.as_csv(list(values), [list(values.values())]).rstrip("\n")
 
