@@ -334,6 +334,7 @@ def judge_pair(
     switched_reference = switched and question.reference.like(
         switched.files, question.selection
     )
+    tr_is_read = tr is None
     if switched_reference and (tr is None or td is None):
         from d2rpick.choice.switched.comparison import find_switch_times
 
@@ -354,7 +355,11 @@ def judge_pair(
         from d2rpick.choice.switched.compared_verdict import add_comparison
 
         result = add_comparison(
-            result, question.reference, switched_reference, min_mean_energy
+            result,
+            question.reference,
+            switched_reference,
+            min_mean_energy,
+            tr_is_read=tr_is_read,
         )
         times += [text for name in switched.sources for text in ("--switched", name)]
         times += ["--min-mean-energy", repr(min_mean_energy)] * (

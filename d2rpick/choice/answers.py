@@ -73,7 +73,9 @@ class PairVerdict(AnswerAtTd):
 
     ``tr_ok`` and ``td_ok`` are None if the record does not show whether the time is suitable. ``remarks`` are the
     ``reasons`` that are not objections to the pair, or that only repeat that the residual is large. ``computed``
-    contains the comparison with a finished switched run, if there is one.
+    contains the finished switched run, and ``switched`` its comparison with the reference run, if there is such a run.
+    ``tr_interval`` is the output interval of the switched run that contains tr [time]; None if tr was given instead of
+    read from this run.
     """
 
     situation: Situation
@@ -87,6 +89,7 @@ class PairVerdict(AnswerAtTd):
     switched: Comparison | None = None
     health: Health | None = None
     computed: History | None = None
+    tr_interval: float | None = None
 
     @property
     def verified(self) -> bool:
@@ -97,7 +100,7 @@ class PairVerdict(AnswerAtTd):
 
     @cached_property
     def decision(self) -> Decision:
-        """Verdict on the pair, with its reason and cure."""
+        """Verdict on the pair, with the reason and the remedy."""
         decision = self._decide(None)
         if decision.grade == POOR:
             decision = self._decide(self.better)
@@ -640,7 +643,7 @@ def _find_saving_pair(situation: Situation) -> Pair | None:
 
 def _examine_anew(situation: Situation, td: float) -> Situation:
     """Examine the same record at another td in the same way as at a td given by the user."""
-    # The oscillator is fitted again, but the slow search for the reason of its refusal is skipped.
+    # The oscillator is fitted again, but the slow search for the reason for its rejection is skipped.
     quick = situation.evidence.span is None
     return examine_td(situation.history, td, situation.settings, quick=quick)
 

@@ -34,11 +34,13 @@ class Limit(NamedTuple):
     """A limit that a recommended pair must meet. An unknown value does not meet it.
 
     ``quantity`` is a column of judged candidates, or an attribute of the situation at td.  If ``is_lower`` is True, the
-    value must not be below the limit, otherwise not above it.
+    value must not be below the limit, otherwise not above it.  If ``is_of_vibration`` is True, a flight in which
+    nothing vibrates meets the limit.
     """
 
     quantity: str
     is_lower: bool = False
+    is_of_vibration: bool = False
 
     def is_kept_by(self, values: Any, limit: float) -> Any:
         """Return True for each of the ``values`` that meets the limit; an unknown value (NaN) does not meet it.
@@ -130,13 +132,17 @@ class ChoiceOptions:
         "Reject a td with a larger kinetic fraction.",
         NOT_NEGATIVE,
         "K",
-        metadata=_describe_use(limit=Limit("kinetic_share"), of_cards=True),
+        metadata=_describe_use(
+            limit=Limit("kinetic_share", is_of_vibration=True), of_cards=True
+        ),
     )
     max_residual: float | None = make_option(
         "Reject a pair with a larger residual.",
         NOT_NEGATIVE,
         "R",
-        metadata=_describe_use(limit=Limit("residual"), of_cards=True),
+        metadata=_describe_use(
+            limit=Limit("residual", is_of_vibration=True), of_cards=True
+        ),
     )
     fit_window: tuple[float, float] | None = make_option(
         "Time range to which the oscillator is fitted.",

@@ -293,7 +293,7 @@ def read_settings(
     Raises
     ------
     ConfigurationError
-        For a key that is no option, or a value that its option does not allow.
+        For a key that is not an option, or a value that its option does not allow.
     """
     values = {
         option: _read_value(ctx, option, value, position)
@@ -421,7 +421,7 @@ def is_used(
     given_values: Mapping[str, Any],
     all_values: Mapping[Any, Any],
 ) -> bool:
-    """Return True if a setting applies, given the options with ``given_values`` and all options in ``all_values``."""
+    """Return True if an option applies to the options of the user (``given_values``) and of all (``all_values``)."""
     if any(name in given_values for name in getattr(option, "instead_of", ())):
         return False
     if option.name in CARDS and (

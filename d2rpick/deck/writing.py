@@ -288,7 +288,7 @@ def _keep_bodies_off(
 
 
 def _read_repeated_blocks(leg: RadiossLeg, printed_leg: RadiossLeg) -> bytes:
-    """Return those blocks of an engine file that are repeated in a printed engine run."""
+    """Return the blocks of an engine file that must be repeated in the printed engine file ``printed_leg``."""
     return b"".join(
         read_block(block)
         for block in read_blocks(leg.run.block.source)

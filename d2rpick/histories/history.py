@@ -448,7 +448,7 @@ class History:
         )
 
     def check_unit(self, *times: float, argument: str) -> None:
-        """Raise RangeError if the times of an ``argument`` seem to have another unit than the record."""
+        """Raise RangeError if the times of an ``argument`` seem to be in a different unit from those of the record."""
         # A time above 1/1000 of the end of the record has the right unit, so no further check is needed.
         if times[-1] * 1e3 > self.time[-1]:
             return

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from d2rpick.rules.base import Finding, Unreadable
 
     class Checks(Protocol):
-        """What the output formats show of the findings in several decks."""
+        """Findings in several decks, with the attributes that the output formats use."""
 
         # Mark of a dataclass, of which `dataclasses.replace` makes changed copies.
         __dataclass_fields__: ClassVar[dict[str, Any]]

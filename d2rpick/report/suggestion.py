@@ -286,7 +286,7 @@ def describe_improvement(answer: PairSuggestion, better: Pair) -> str:
 def list_alternatives(answer: PairSuggestion) -> list[tuple[str, str]]:
     """Return the alternatives to the recommended pair, as (name, sentence) pairs."""
     chosen = answer.recommended.tr if answer.recommended else None
-    # The windows have the energy of td, but "admissible" would contradict the verdict on a pair not to be used.
+    # The energy in these windows matches that at td, but "admissible" would contradict the verdict "do not use".
     if answer.windows and not is_refused(answer.decision):
         lines = [("admissible", describe_acceptable_windows(answer.windows, chosen))]
     else:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.base.errors import make_printable
-from d2rpick.choice.pair.grades import DO_NOT_USE
+from d2rpick.choice.pair.grades import DO_NOT_USE, GOOD
 from d2rpick.choice.pair.warnings import POOR_RESIDUAL
 from d2rpick.choice.switched.comparison import MOST_MOMENTUM_ERROR
 from d2rpick.report import keys, tables
@@ -53,7 +53,8 @@ SWITCHED: Final = row(
     Field("source", get_kind("texts", minItems=1), "files of the switched run"),
     Field("energy_frozen", "number", "energy of the switched run at td"),
     Field("energy_td", "number", "energy of the reference run at td"),
-    Field("level_ratio", "number?", "energy_frozen divided by energy_td"),
+    Field("level_ratio", "number?", "energy_frozen divided by energy_td; null if energy_td is only "
+                                      "round-off"),
     Field("end", "number", "end of the comparison, which begins at td"),
     Field("mean_after", "number", "mean energy after td in the switched run"),
     Field("mean_after_reference", "number", "mean energy after td in the reference run"),
@@ -150,14 +151,14 @@ def list_next_step(
 
 
 def _name_usable_results(answer: PairVerdict) -> str:
-    """Return the advice to use the switched run, restricted to the motion if its vibration is known to be wrong."""
+    """Return the advice to use the switched run, or only its motion if its vibration is known to be wrong."""
     decision = answer.decision
     switched = answer.switched
     is_kept = switched is None or _keeps_vibration(switched, decision)
-    usable = "the results"
     if decision.allows_only_motion or not is_kept:
-        usable = "only the motion"
-    return f"use {usable} of the switched run"
+        return "use only the motion of the switched run"
+    care = "" if decision.grade == GOOD else " with care"
+    return f"use the results of the switched run{care}"
 
 
 def place_comparison(
@@ -197,7 +198,7 @@ def _contradicts_verdict(switched: Comparison, decision: Decision) -> bool:
 def _list_limited_values(switched: Comparison) -> list[str]:
     """Return the compared values that have limits, each with its limits."""
     compared = []
-    if switched.mean_after_reference > 0:
+    if switched.has_energy:
         ratio = switched.mean_after / switched.mean_after_reference
         limits = f"{100 * switched.min_mean:g}% to {100 * (2 - switched.min_mean):g}%"
         compared.append(
@@ -247,7 +248,7 @@ def list_pair_evidence(answer: PairVerdict) -> list[tuple[str, str]]:
     ]
     if best.run_time_share is not None:
         lines.append(("saves", format_saved_share(best.run_time_share)))
-    if exact := format_accuracy(best):
+    if exact := format_accuracy(best, answer.tr_interval):
         lines.append(("tr", exact))
     return lines
 

@@ -240,15 +240,15 @@ class ModalVibration:
         )
 
     def elastic_energy(self, t: Samples | float) -> Samples:
-        """Return V, at least 0, in the shape of ``t`` [energy]."""
+        """Return the elastic energy V of the vibration, at least 0, in the shape of ``t`` [energy]."""
         return np.maximum(self.reading.elastic_energy(t), 0.0)
 
     def vibration_energy(self, t: Samples | float) -> Samples:
-        """Return U = V + T, in the shape of ``t`` [energy]."""
+        """Return the vibration energy U = V + T (elastic plus kinetic), in the shape of ``t`` [energy]."""
         return self.reading.vibration_energy(t)
 
     def kinetic_energy(self, t: Samples | float) -> Samples:
-        """Return T, at least 0, in the shape of ``t`` [energy]."""
+        """Return the kinetic energy T of the vibration, at least 0, in the shape of ``t`` [energy]."""
         return np.maximum(self.vibration_energy(t) - self.elastic_energy(t), 0.0)
 
     def overlap(self, tr: Samples | float, td: Samples | float) -> Samples:
@@ -283,7 +283,10 @@ class ModalVibration:
 
     @cached_property
     def _at_all_times(self) -> tuple[Samples, _Course, Complex]:
-        """Return elastic energies at ``time`` and at finer times, and the part of the coherence that depends on tr."""
+        """Return V at ``time`` and on a finer time grid, and the factor of tr in the coherence C, for `profile`.
+
+        C is the coherence of the lines between tr and td, the product of a factor of tr and a factor of td.
+        """
         finer = np.linspace(
             self.time[0], self.time[-1], _FINER * (self.time.size - 1) + 1
         )

@@ -12,7 +12,8 @@ from d2rpick.api.checking import Findings
 from d2rpick.report import formats, rule_texts
 from d2rpick.rules import RULES, Checked, check_deck
 from d2rpick.rules.base import Finding, Severity
-from d2rpick.rules.rule import END, GOOD, HEAD, PARTS, write_automatic_card
+from d2rpick.rules.example import END, HEAD, PARTS, write_automatic_card
+from d2rpick.rules.rule import GOOD
 from tests.command import ROOT
 from tests.deck.test_radioss_run import write_run
 from tests.decks import write

@@ -50,8 +50,9 @@ _BETWEEN: Final = 101
 class Comparison(NamedTuple):
     """Differences between a switched run and its reference run; unknown quantities are None.
 
-    The fields are the keys of the JSON output, except ``min_mean``, which is the smallest expected ratio of the means
-    [-].
+    The fields are the keys of the JSON output, except the last two: ``min_mean`` is the smallest expected ratio of the
+    means [-], and ``has_energy`` is False if the energy of the reference run after td is only round-off, so that it is
+    not compared.
 
     ``energy_frozen`` is the energy of the switched run at td, ``energy_td`` that of the reference run. ``rigid_from``
     and ``rigid_to`` are the first and last states of the window around the middle of (tr, td) in which the energy of
@@ -78,6 +79,7 @@ class Comparison(NamedTuple):
     objections: tuple[str, ...]
     notes: tuple[str, ...]
     min_mean: float = 0.0
+    has_energy: bool = True
 
 
 def compare_with_reference(
@@ -192,14 +194,16 @@ def compare_runs(
     if is_reported:
         objections += _check_energies_after(reference, after, pair, tolerance, min_mean)
     objections += _check_momentum(error)
+    rounding = round_off(reference)
+    mean_reference = float(after.reference.mean())
     return Comparison(
         source=switched.source,
         energy_frozen=frozen,
         energy_td=energy_td,
-        level_ratio=frozen / energy_td if energy_td > 0 else None,
+        level_ratio=frozen / energy_td if energy_td > rounding else None,
         end=after.end,
         mean_after=float(after.switched.mean()),
-        mean_after_reference=float(after.reference.mean()),
+        mean_after_reference=mean_reference,
         spread_after=float(after.switched.std()),
         spread_after_reference=float(after.reference.std()),
         momentum_error=error,
@@ -209,6 +213,7 @@ def compare_runs(
         objections=tuple(objections),
         notes=tuple(notes),
         min_mean=min_mean,
+        has_energy=mean_reference > rounding,
     )
 
 

@@ -477,10 +477,12 @@ def _choose_compared_parts(
                 f"judged by the parts that were rigid: {_list_part_names(still)}"
             )
         else:
-            deforming = (part for part in parts if part not in still)
-            objections.append(
-                f"not rigid from tr {pair[0]:g} to td {pair[1]:g} in the switched run: {_list_part_names(deforming)}"
-            )
+            deforming = _find_deforming(switched, parts, pair, ~rigid)
+            if deforming:
+                names = _list_part_names(deforming)
+                objections.append(
+                    f"not rigid from tr {pair[0]:g} to td {pair[1]:g} in the switched run: {names}"
+                )
     misreported = _find_misreported(without, switched.run, chosen, pair)
     if not misreported and chosen is parts:
         return SameParts(history, switched.history, tuple(objections))
@@ -502,6 +504,23 @@ def _choose_compared_parts(
     energies = without.run.history(selection), switched.run.history(selection)
     return SameParts(
         *energies, tuple(objections), tuple(notes), is_reported=bool(comparable)
+    )
+
+
+def _find_deforming(
+    switched: Reference,
+    parts: tuple[Part, ...],
+    pair: Times,
+    is_moving: NDArray[np.bool_],
+) -> tuple[Part, ...]:
+    """Return the moving parts whose energy changes between tr and td by more than round-off."""
+    inside = find_window(switched.run.part_time, *pair)
+    changes = np.ptp(switched.run.part_energies(parts)[inside], axis=0)
+    deforms = is_moving & (changes > round_off(switched.history))
+    return tuple(
+        part
+        for part, is_deforming in zip(parts, deforms.tolist(), strict=True)
+        if is_deforming
     )
 
 

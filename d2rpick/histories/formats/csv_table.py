@@ -209,7 +209,7 @@ def _note_unsure_columns(layout: Layout) -> str:
 
 
 def _list_columns(layout: Layout, columns: Sequence[int]) -> str:
-    """Return numbers and names of the columns that the user can choose."""
+    """List the columns from which the user can choose, with their numbers and names."""
     return list_names([f"{column + 1} {layout.name(column)!r}" for column in columns])
 
 
