@@ -269,6 +269,8 @@ def list_separate_objections(
 
 def _check_order(tr: float, td: float) -> None:
     """Raise RangeError if tr is not before td."""
+    if tr == td:
+        raise RangeError(f"tr and td are both {tr:g}; give a td after tr")
     if not tr < td:
         raise RangeError(
             f"tr {tr:g} is not before td {td:g}; give the earlier time as tr"

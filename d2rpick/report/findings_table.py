@@ -255,7 +255,9 @@ def _name_next_step(checks: Checks) -> str:
 
 
 def _name_history(checks: Checks) -> tuple[tuple[str, ...], str]:
-    """Return the history next to the only deck or, if there is none, a placeholder, and a hint to replace it."""
+    """Return the given history or the one next to the only deck, otherwise a placeholder and a hint to replace it."""
+    if checks.history:
+        return tables.make_positional(checks.history), ""
     decks = [result.deck for result in checks.results]
     history = find_history_beside(decks[0]) if len(decks) == 1 else None
     if history:

@@ -393,7 +393,8 @@ def _list_steps_for_record(
     plan: RunPlan, question: RepeatedQuestion, written_deck: WrittenDeck | None
 ) -> list[tuple[str, str]]:
     """Return the next commands for the part of the run that was read."""
-    if not plan.windows or _uses_only_poor_windows(plan):
+    is_refused = not plan.windows or _uses_only_poor_windows(plan)
+    if is_refused and not written_deck:
         return _list_step_without_window(plan, question)
     waiting = any(row.status == "re-plan" for row in plan.flights)
     cards = name_step_to_card(
@@ -432,7 +433,8 @@ def _list_step_without_window(
 ) -> list[tuple[str, str]]:
     """Return the command to type next if no window of a plan can be used now."""
     rows = [row for row in plan.flights if row.answer and not row.done]
-    if plan.done:
+    is_partly_rigid = any(caution.code == "partly-rigid" for caution in plan.cautions)
+    if plan.done or is_partly_rigid:
         return [("next", name_step_after_switched_run(question))]
     if not rows:
         if not plan.flights and not plan.history.complete:

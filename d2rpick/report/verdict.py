@@ -82,6 +82,11 @@ DOCUMENT: Final = Document("d2rpick/verify/2", "Answer of d2rpick verify; times 
     Field("switched", maybe(SWITCHED), "comparison of a finished switched run with the reference run; null without "
                                        "--switched"),
 ))  # fmt: skip
+# Step after a comparison within the limits of a pair that cannot be used.
+_USE_MOTION_OF_SWITCHED_RUN: Final = (
+    "use at most the motion of this switched run, because nothing shows that its vibration after td is right; "
+    "`min_quality` poor accepts it"
+)
 COMPARED = ("", "switched", "reference")
 
 
@@ -123,7 +128,9 @@ def list_next_step(
     decision = answer.decision
     situation = answer.situation
     if decision.verdict == DO_NOT_USE:
-        if decision.best_of or situation.flight.start is None:
+        if answer.switched and not answer.switched.objections:
+            otherwise = _USE_MOTION_OF_SWITCHED_RUN
+        elif decision.best_of or situation.flight.start is None:
             otherwise = name_step_after_flight(situation, decision, question)
         else:
             line = write_command(question, "explore", "--td", f"{answer.td:.6g}")

@@ -89,8 +89,8 @@ _CHECK_GIVEN_TIMES: Final = (
     "or let the evidence decide, without `after` and `landing`"
 )
 # End of the advice on a pair, which is omitted if a finished switched run is already available.
-_COMPARE: Final = "compare with a finished switched run"
-_OR_COMPARE: Final = f", or {_COMPARE}"
+COMPARE: Final = "compare with a finished switched run"
+_OR_COMPARE: Final = f", or {COMPARE}"
 
 
 def rank_candidates(
@@ -533,7 +533,7 @@ def _describe_unknown_direction(situation: Situation) -> Cause:
         cures.append(for_modes)
     return Cause(
         f"{unknown}{why}",
-        f"{', '.join(cures)}{_OR_COMPARE}" if cures else _COMPARE,
+        f"{', '.join(cures)}{_OR_COMPARE}" if cures else COMPARE,
         kind=unknown,
     )
 
@@ -542,7 +542,7 @@ def omit_comparison(quality: Quality) -> Quality:
     """Return the grades without the advice to compare with a switched run, for use after this comparison."""
 
     def omit(cure: str) -> str:
-        return _MORE_OFTEN if cure == _COMPARE else cure.removesuffix(_OR_COMPARE)
+        return _MORE_OFTEN if cure == COMPARE else cure.removesuffix(_OR_COMPARE)
 
     return _edit_cures(quality, omit)
 
