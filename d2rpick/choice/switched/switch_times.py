@@ -20,7 +20,7 @@ from d2rpick.flight.window import LAST_DIGIT
 from d2rpick.histories.samples import find_stretches
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from d2rpick.base.spans import Times
     from d2rpick.choice.question import Reference
@@ -91,11 +91,11 @@ def find_switched_windows(
     ]
     windows = windows or [
         SwitchedWindow(
-            _find_start(history, reference, first),
-            float(time[first]),
-            float(time[last]),
+            _find_start(history, reference, span.first),
+            float(time[span.first]),
+            float(time[span.last]),
         )
-        for first, last in _find_changed_spans(history, reference)
+        for span in _find_changed_spans(history, reference)
     ]
     return tuple(windows)
 
@@ -184,12 +184,11 @@ def _explain_missing_window(switched: Reference, reference: History) -> tuple[st
             "both runs have the same energies, so it may be the reference run again"
         )
         return reason, other_run
-    spans = _find_constant_spans(history, reference)
-    if not spans:
+    constant = next(_find_constant_spans(history, reference), None)
+    if constant is None:
         reason = f"the energy never stays constant for {FEWEST} states, so no part seems to have been rigid"
         return reason, other_run
-    first, last = spans[0]
-    start, end = history.time[first], history.time[last]
+    start, end = history.time[constant.first], history.time[constant.last]
     reason = (
         f"the energy stays constant from {start:.6g} to {end:.6g}, but that of the reference run does too, so it does "
         "not show when the parts were rigid"
@@ -199,33 +198,42 @@ def _explain_missing_window(switched: Reference, reference: History) -> tuple[st
     return reason, "give the rigid parts with `parts`, or `tr` and `td`"
 
 
+class _ConstantSpan(NamedTuple):
+    """First and last state of a span of constant energy, and the change that is treated as zero [energy]."""
+
+    first: int
+    last: int
+    limit: float
+
+
 def _find_constant_spans(
     switched: History, reference: History
-) -> list[tuple[int, int]]:
-    """Return the first and last states of the spans in which the energy of a switched run is constant.
+) -> Iterator[_ConstantSpan]:
+    """Yield the spans in which the energy of a switched run is constant, from state to state and as a whole.
 
     The energies of rigid or resting parts are only round-off, which may change during a fall.
     """
     limits = _find_limits_of_change(switched, round_off(reference))
     unchanged = np.abs(np.diff(switched.energy)) <= limits[1:]
-    still = find_stretches(np.append(False, unchanged), FEWEST)
-    return [(max(span.start - 1, 0), span.stop - 1) for span in still]
+    for still in find_stretches(np.append(False, unchanged), FEWEST):
+        states = slice(max(still.start - 1, 0), still.stop)
+        limit = 2 * float(limits[states].max())
+        if np.ptp(switched.energy[states]) <= limit:
+            yield _ConstantSpan(states.start, states.stop - 1, limit)
 
 
-def _find_changed_spans(switched: History, reference: History) -> list[tuple[int, int]]:
-    """Return the spans in which the energy of the switched run is constant, but that of the reference run is not.
+def _find_changed_spans(
+    switched: History, reference: History
+) -> Iterator[_ConstantSpan]:
+    """Yield the spans in which the energy of the switched run is constant, but that of the reference run is not.
 
     The end of a span does not count, because a contact may begin there, and a little later in the switched run.
     """
-    limits = _find_limits_of_change(switched, round_off(reference))
-    changed = []
-    for first, last in _find_constant_spans(switched, reference):
-        start, end = switched.time[[first, last]].tolist()
+    for span in _find_constant_spans(switched, reference):
+        start, end = switched.time[[span.first, span.last]].tolist()
         end = max(start, end - _AT_CONTACT * switched.step)
-        largest = 2 * float(limits[first : last + 1].max())
-        if compute_energy_range(reference, start, end) > largest:
-            changed.append((first, last))
-    return changed
+        if compute_energy_range(reference, start, end) > span.limit:
+            yield span
 
 
 def _find_limits_of_change(switched: History, rounding: float) -> Samples:
