@@ -79,13 +79,16 @@ def extract_kinetic_energy(
     Returns
     -------
     time, energy : array of shape (n,), or None
-        States in the flight [time], [energy]; None if no file contains this energy.
+        States in the flight [time], [energy]; None if no file contains this energy, or if it contains only the fall.
 
     Notes
     -----
     Under constant gravity, the kinetic energy of the centre of mass is a quadratic function of time; damping changes it
     only slowly. Neither causes a spectral line.
     """
+    # Imported here to keep start-up fast.
+    from d2rpick.vibration.hidden_energy import RESOLVED
+
     kinetic = history.evidence.kinetic_energy(flight.parts)
     if kinetic is None:
         return None
@@ -97,4 +100,7 @@ def extract_kinetic_energy(
         return None
     since_start = time - time[0]
     parabola = np.polyfit(since_start, energy, 2)
-    return time, energy - np.polyval(parabola, since_start)
+    vibrating = energy - np.polyval(parabola, since_start)
+    # The rounding errors of an energy that does not vibrate must not be read as modes.
+    is_resolved = np.ptp(vibrating) > RESOLVED * float(np.abs(energy).max())
+    return (time, vibrating) if is_resolved else None

@@ -273,9 +273,9 @@ class Case:
         )
 
     @property
-    def whole(self) -> bool:
+    def knows_all_parts(self) -> bool:
         """Return True if all parts are known; a file of switching cards that another deck includes knows none."""
-        return self.parts.all_known and bool(self.parts.materials)
+        return self.parts.all_known and bool(self.parts.material_by_part)
 
     @cached_property
     def end_time(self) -> Value[float] | None:
@@ -514,5 +514,5 @@ class RunCase(Case):
         return rigid_legs
 
 
-Objection = tuple[CardField, str]
+PlacedMessage = tuple[CardField, str]
 """A field of the deck, and what is wrong there."""

@@ -16,6 +16,7 @@ import numpy as np
 
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.histories.samples import compute_median
+from d2rpick.vibration.least_squares import solve_least_squares
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -59,6 +60,8 @@ MOST_GROWTH: Final = 0.2
 # _MOST_DECAYS: largest number of decaying exponentials that the mean contains in addition to a constant.
 # _SAME_DECAY: two exponentials are distinguished if their decays over the record differ by at least this exponent [-].
 _MOST_DECAYS, _SAME_DECAY = 4, 0.05
+# Smallest divisor of numbers of order one [-].
+_TINY: Final = 1e-12
 
 
 class Grid(NamedTuple):
@@ -97,10 +100,11 @@ class Grid(NamedTuple):
         width = ceil(sqrt(count))
         inner = np.arange(width) * self.step
         outer = np.arange(0, count, width) * self.step
-        coarse: Complex = np.exp(np.multiply.outer(outer, poles))
-        fine: Complex = np.exp(np.multiply.outer(inner, poles))
-        products: Complex = coarse[:, np.newaxis] * fine
-        return products.reshape(-1, poles.size)[:count]
+        coarse: Complex = np.exp(np.multiply.outer(poles, outer))
+        fine: Complex = np.exp(np.multiply.outer(poles, inner))
+        # The times of a wave are adjacent in memory, because long inner loops are faster.
+        products: Complex = coarse[:, :, np.newaxis] * fine[:, np.newaxis]
+        return products.reshape(poles.size, -1)[:, :count].T
 
     def gain(self, poles: Complex) -> Complex:
         """Return the mean of ``exp(p t)`` over a block relative to its middle value, in the shape of ``poles`` [-]."""
@@ -189,13 +193,18 @@ class Exponentials(NamedTuple):
 
         The parameters are the real parts of all weights, their imaginary parts, then the same for the poles.
         """
-        courses = self.waves(times)
-        moved = courses * self.weights * (times - self.origin)[:, np.newaxis]
-        return np.hstack([courses.real, -courses.imag, moved.real, -moved.imag])
+        since_origin = times - self.origin
+        return _differentiate(self.waves(times), self.weights, since_origin)
 
     def some(self, which: NDArray[np.bool_]) -> Exponentials:
         """Return the waves selected by a mask."""
         return Exponentials(self.poles[which], self.weights[which], self.origin)
+
+
+def _differentiate(waves: Complex, weights: Complex, since_origin: Samples) -> Samples:
+    """Return the derivatives of a sum of ``waves`` (n, k), as `Exponentials.differentiate` does, shape (n, 4 k)."""
+    moved = waves * weights * since_origin[:, np.newaxis]
+    return np.hstack([waves.real, -waves.imag, moved.real, -moved.imag])
 
 
 class Spectrum(NamedTuple):
@@ -240,6 +249,17 @@ class Spectrum(NamedTuple):
             for waves in (self.lines, self.mean)
         )
         return self._replace(lines=lines, mean=mean)
+
+    def differentiate_means(self, grid: Grid) -> Samples:
+        """Return the derivatives of the means over the m blocks of a grid that begins at the origin, (m, 4 k + mean).
+
+        The parameters are those of `Exponentials.differentiate` for the k lines, then the weights of the mean.
+        """
+        averaged = self.average_blocks(grid)
+        lines = averaged.lines
+        since_origin = grid.time - grid.time[0]
+        of_lines = _differentiate(grid.waves(lines.poles), lines.weights, since_origin)
+        return np.hstack([of_lines, grid.waves(self.mean.poles).real])
 
     def at(self, t: Samples | float) -> Samples:
         """Return the energy at each time, with the shape of ``t`` [energy]."""
@@ -315,10 +335,17 @@ def _get_needed(spectrum: Spectrum) -> float:
 
 
 class _SignalSpace:
-    """The signal subspace spanned by the windows of a record; its directions are in descending order of size."""
+    """The signal subspace spanned by the windows of a record; its directions are in descending order of size.
+
+    Two products of the directions suffice to find poles: of all values but the last with all values but the first, and
+    of the ``last_values`` with themselves, because the directions are orthonormal.
+    """
 
     def __init__(self, vectors: Samples, step: float) -> None:
-        self.vectors, self.step = vectors, step
+        self.size, self.step = int(vectors.shape[1]), step
+        leading = vectors[:, : max(_ORDERS)]
+        self._shifted = leading[:-1].T @ leading[1:]
+        self._last_values = leading[-1]
 
     @classmethod
     def of(cls, grid: Grid) -> _SignalSpace:
@@ -327,15 +354,13 @@ class _SignalSpace:
         windows = np.lib.stride_tricks.sliding_window_view(grid.energy, lags)
         return cls(np.linalg.eigh(windows.T @ windows)[1][:, ::-1], grid.step)
 
-    @property
-    def size(self) -> int:
-        """Return the number of dimensions of the subspace."""
-        return int(self.vectors.shape[1])
-
     def poles(self, order: int) -> Complex:
         """Return the poles of ``order`` exponentials [1/time], from the shift invariance of the subspace (ESPRIT)."""
-        leading = self.vectors[:, :order]
-        shift = np.linalg.lstsq(leading[:-1], leading[1:], rcond=None)[0]
+        shifted = self._shifted[:order, :order]
+        last = self._last_values[:order]
+        # The least-squares solution for orthonormal directions without their last values (Sherman and Morrison).
+        without_last = max(1 - float(last @ last), _TINY)
+        shift = shifted + np.outer(last, last @ shifted) / without_last
         factors = np.linalg.eigvals(shift)
         is_usable = np.isfinite(factors) & (np.abs(factors) > 1e-6)
         usable_factors = factors[is_usable].astype(np.complex128)
@@ -361,7 +386,7 @@ def fit_weights(grid: Grid, lines: Complex, mean: Complex) -> Spectrum:
     waves = grid.waves(all_poles) * grid.gain(all_poles)
     swinging = all_poles.imag > 0
     design = np.hstack([waves.real, -waves.imag[:, swinging]])
-    solution = np.linalg.lstsq(design, grid.energy, rcond=1e-9)[0]
+    solution = solve_least_squares(design, grid.energy)
     weights = solution[: all_poles.size].astype(np.complex128)
     weights[swinging] += 1j * solution[all_poles.size :]
     origin = float(grid.time[0])
