@@ -404,7 +404,7 @@ def parts(tr: float | None, td: float | None, request: Request, output: Output) 
     with open_with_output(request, output) as (run, output):
         answer = compare_parts(run, request, tr, td)
     output.notes(run.notes, answer.cautions)
-    question = request.repeat()
+    question = request.repeat()._replace(times=options.write_times(tr=tr, td=td))
 
     def write_page() -> str:
         from d2rpick.report.pages import (
@@ -415,7 +415,8 @@ def parts(tr: float | None, td: float | None, request: Request, output: Output) 
 
     output.beside_answer(answer, write_page)
     output.answer(answer, question=question)
-    output.finish(objection=answer.recommended is None)
+    best = answer.recommended
+    output.finish(objection=best is None or not best.is_usable)
 
 
 @options.make_command

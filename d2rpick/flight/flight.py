@@ -389,7 +389,7 @@ def _find_flight_by_momentum(
 def _limit_to_undriven(
     history: History, flight: FreeFlight, td: float
 ) -> FreeFlight | None:
-    """Return the part of a flight shown by the momentum in which no load does work; None if one does at td.
+    """Return the part of a flight, found by the momentum, during which no load does work; None if a load does at td.
 
     Opposite forces and weak forces may do work on the model although its momentum hardly shows them.
     """

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 FORMATS = ("png", "svg", "pdf")
-# Palette of Okabe and Ito, whose colours can be distinguished with any colour vision.
+# Palette of Okabe and Ito, whose colours remain distinguishable to colour-blind readers.
 REFERENCE, SWITCHED, GOOD, FLIGHT, BETTER = (
     "#000000",
     "#d55e00",

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base import __version__
 from d2rpick.choice.pair.grades import DO_NOT_USE, USE, USE_WITH_CARE
+from d2rpick.deck.beside import SOME_NODES, SOME_PARTS
 from d2rpick.deck.printing import DEFAULT, SOLVERS
 from d2rpick.report.decision import list_verdict_lines
-from d2rpick.report.next_step import choose_example_id
 from d2rpick.report.situation import list_health_measures, list_situation_heading
 from d2rpick.report.tables import Cell, format_short, quote_shell_line
 
@@ -536,7 +536,7 @@ def _list_solver_input(
     command = ["d2rpick", "card", "--tr", repr(times[0]), "--td", repr(times[1])]
     command += [] if solver == DEFAULT else ["--solver", solver]
     kind = SOLVERS[solver].switches
-    example = choose_example_id(kind)
+    example = SOME_NODES if kind == "node" else SOME_PARTS
     line = make_element(
         "pre",
         quote_shell_line([*command, f"--{kind}", example, *record.judging]),
@@ -544,8 +544,11 @@ def _list_solver_input(
     )
     title = _SWITCHED[kind]
     return (
-        make_element("p", f"Put the ids of your {title} in place of {example}."),
-        make_element("p", "Printed, and judged again as printed, by"),
+        make_element(
+            "p",
+            f"No file of this answer names the {title} to be switched. In the command below, put their ids in place of "
+            f"{example}; it prints the card and judges its times.",
+        ),
         line,
     )
 

@@ -72,7 +72,8 @@ MAX_STRUCTURE: Final = 0.02
 _DEVIATIONS: Final = 3.0
 # The structure is certain if the covariance exceeds that of white noise by this [standard deviations].
 _BEYOND_DOUBT: Final = 6.0
-# A fit to all samples would fail if the misfit structure in a few samples exceeds MAX_STRUCTURE by this factor [-].
+# A fit to some of the samples is rejected at once if its systematic misfit exceeds MAX_STRUCTURE by this factor [-];
+# a fit to all samples would be rejected too.
 _BEYOND_STRUCTURE: Final = 2.0
 
 
@@ -151,7 +152,7 @@ def _take_few(s: Samples, e: Samples, most: int = COARSE) -> tuple[Samples, Samp
 def refine(
     starts: Sequence[Samples], model: Model, s: Samples, e: Samples, worst: float
 ) -> Samples | None:
-    """Refine the starting values; return the best fit, or None if it leaves more than ``worst`` of the variance."""
+    """Refine the starting values; return the best fit, or None if its misfit exceeds ``worst`` times the variance."""
     variance = float(np.sum((e - np.mean(e)) ** 2))
     best = None
     least_cost = worst * variance

@@ -114,13 +114,9 @@ def _refine_spectrum(grid: Grid, spectrum: Spectrum) -> Spectrum:
 
 def _compute_step_of_poles(grid: Grid, spectrum: Spectrum) -> Complex:
     """Return the change of the poles, shape (k,), that would remove the misfit if all parameters acted linearly."""
-    averaged = spectrum.average_blocks(grid)
-    times = grid.time
     count = spectrum.lines.poles.size
-    design = np.hstack(
-        [averaged.lines.differentiate(times), averaged.mean.waves(times).real]
-    )
-    if design.shape[1] > _MOST_PARAMETERS * times.size:
+    design = spectrum.differentiate_means(grid)
+    if design.shape[1] > _MOST_PARAMETERS * grid.time.size:
         return np.zeros(count, np.complex128)
     scale = np.maximum(np.linalg.norm(design, axis=0), 1e-300)
     design /= scale
