@@ -35,7 +35,6 @@ from d2rpick.choice.pair.quality import (
     ROUNDING,
     Quality,
     list_exceeded_limits,
-    omit_comparison,
     rank_candidates,
 )
 from d2rpick.choice.pair.situation import AnswerAtTd, Situation, examine_td
@@ -133,6 +132,9 @@ class PairVerdict(AnswerAtTd):
         )
         if self.switched is None:
             return decision
+        # Imported here to keep start-up fast.
+        from d2rpick.choice.pair.cures import omit_comparison
+
         quality = omit_comparison(decision.quality)
         return decision._replace(quality=quality, is_compared=True)
 
@@ -269,6 +271,8 @@ def list_separate_objections(
 
 def _check_order(tr: float, td: float) -> None:
     """Raise RangeError if tr is not before td."""
+    if tr == td:
+        raise RangeError(f"tr and td are both {tr:g}; give a td after tr")
     if not tr < td:
         raise RangeError(
             f"tr {tr:g} is not before td {td:g}; give the earlier time as tr"

@@ -14,7 +14,7 @@ from d2rpick.base.tuples import NamedTuple
 from d2rpick.histories.content import OnDisk, open_content, open_scattered
 from d2rpick.histories.digits import parse_seconds
 from d2rpick.histories.formats import READERS
-from d2rpick.histories.names import number_in_family, suggest_name
+from d2rpick.histories.names import number_in_family, suggest_file
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -28,8 +28,6 @@ _FORCES: Final = r"(?i:r[cw]forc(?:\.gz)?)"
 _GZIP = b"\x1f\x8b"
 # Number of packed bytes that are unpacked at a time; they unpack to at most 68 MB.
 _BLOCK = 1 << 16
-# Smallest similarity of a suggested file name [-]; it is high, because equal suffixes alone make names similar.
-_LIKENESS = 0.8
 _NUMBER = r"\d+\.?\d*|\.\d+"
 # A table with this word in its first bytes is probably an energy history.
 _ENERGY_IN_HEAD: Final = b"energy"
@@ -317,12 +315,7 @@ def _suggest_file(name: str) -> str:
         if name.isdecimal():
             hint += "; several parts are separated by commas, as in `parts` 1,2"
         return hint
-    folder, wanted = os.path.split(name)
-    try:
-        siblings = os.listdir(folder or ".")  # noqa: PTH208  pathlib would slow down start-up
-    except OSError:
-        return ""
-    return suggest_name(wanted, siblings, _LIKENESS)
+    return suggest_file(name)
 
 
 def _unpack(name: str, packed: bytes | OnDisk) -> Source:

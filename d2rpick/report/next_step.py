@@ -266,6 +266,8 @@ def name_lack_of_pairs(question: RepeatedQuestion) -> str:
     limits = [
         f"{name} {words[words.index(name) + 1]}" for name in names if name in words
     ]
+    # This value accepts every pair, so no other value allows more.
+    limits = [limit for limit in limits if limit != "--min-quality poor"]
     if not limits:
         return _NO_PAIR
     values = "another value" if len(limits) == 1 else "other values"
@@ -326,7 +328,7 @@ def name_way_out_of_run(
         )
     cure = decision.cure_without_other_times if decision else ""
     if cure:
-        return f"{no_pair}: {cure}"
+        return f"{no_pair}: {cure}{_name_way_to_switched_run(cure, question)}"
     if situation.history.parts:
         line = write_command(question._replace(parts=()), "parts")
         return f"{no_pair} with these parts; find other parts with {line}"
@@ -341,6 +343,29 @@ def name_step_after_switched_run(question: RepeatedQuestion) -> str:
     return (
         f"compare this run with its reference run: {quote_shell_line(words)} ({hint})"
     )
+
+
+def _name_way_to_switched_run(cure: str, question: RepeatedQuestion) -> str:
+    """Return the command that writes the deck of a switched run if a ``cure`` asks for one; otherwise ""."""
+    # Imported here, because a card without a history needs no numpy.
+    from d2rpick.choice.pair.quality import COMPARE
+
+    if COMPARE not in cure or not question.parts:
+        return ""
+    deck = name_deck_of_run(question)
+    given = () if "--deck" in question.options else ("--deck", deck.name)
+    words = (*given, "--min-quality", "poor", "--write-deck", _FOLDER)
+    options = _leave_out(question.options, "--min-quality")
+    line = write_command(question._replace(options=options), "plan", *words)
+    return f". This writes the deck of such a run: {line}{deck.hint if given else ''}"
+
+
+def _leave_out(words: Sequence[str], name: str) -> tuple[str, ...]:
+    """Return the words of a command without an option and its value."""
+    if name not in words:
+        return tuple(words)
+    position = words.index(name)
+    return (*words[:position], *words[position + 2 :])
 
 
 def name_step_after_refusal(

@@ -303,13 +303,17 @@ def _find_mixed_units(times: list[float], end: float, run_end: str) -> str | Non
     latest = max(later)
     earliest = min(later)
     if 10 * end < latest < _THOUSAND * end and earliest >= end:
-        direction = "later: milliseconds for seconds"
+        size = "larger: milliseconds for seconds"
     elif end / 50 <= _THOUSAND * latest < end:
-        direction = "earlier: seconds for milliseconds"
+        size = "smaller: seconds for milliseconds"
     else:
         return None
-    problem = f"the switching times reach {latest:g} but {run_end}, about 1000 times {direction}"
-    return f"{problem}? give both in the same unit"
+    problem = (
+        f"the switching times reach only {latest:g}"
+        if size.startswith("smaller")
+        else f"the switching times reach {latest:g}"
+    )
+    return f"{problem} but {run_end}: they are about 1000 times {size}? give both in the same unit"
 
 
 @set_passing(
