@@ -248,8 +248,9 @@ def _name_next_step(checks: Checks) -> str:
     switched = tables.make_positional(runs[:1] or [_SOME_RUN])
     hint = "" if runs else f" (folder of the switched run instead of {_SOME_RUN})"
     parts = _name_judged_parts(checks)
+    times = _name_times_at_rest(checks)
     line = tables.quote_shell_line(
-        ("d2rpick", "verify", "--switched", *switched, *parts, *history)
+        ("d2rpick", "verify", *times, "--switched", *switched, *parts, *history)
     )
     return f"run the deck, and compare the run with {line}{hint}"
 
@@ -264,6 +265,21 @@ def _name_history(checks: Checks) -> tuple[tuple[str, ...], str]:
         return tables.make_positional([history]), ""
     hint = f" (history of the reference run instead of {_SOME_HISTORY})"
     return (_SOME_HISTORY,), hint
+
+
+def _name_times_at_rest(checks: Checks) -> tuple[str, ...]:
+    """Return the options with the first judged window, if nothing vibrates in it; otherwise no options.
+
+    The energies of such a run do not show when its parts were rigid.
+    """
+    windows = (window for result in checks.results for window in result.windows)
+    judged = [window for window in windows if window.decision]
+    first = min(judged, key=lambda window: window.tr, default=None)
+    if first is None or first.td is None:
+        return ()
+    if first.decision is None or not first.decision.at_rest:
+        return ()
+    return ("--tr", f"{first.tr:.6g}", "--td", f"{first.td:.6g}")
 
 
 def _name_judged_parts(checks: Checks) -> tuple[str, ...]:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.errors import COPY_AGAIN, list_names
+from d2rpick.base.options import make_option_name
+from d2rpick.choice.options import list_uses
 from d2rpick.choice.pair.grades import DO_NOT_USE
 from d2rpick.deck.beside import SOME_NODES, SOME_PARTS, find_deck_beside
 from d2rpick.report.tables import make_positional, quote_shell_line
@@ -32,13 +34,11 @@ _FOLDER: Final = "switched"
 _FLYING: Final = "flying"
 # Statement of the last step, when the pairs of all flights have been compared.
 _NO_PAIR: Final = "no pair of this run can be used"
-# Options that can be the reason why no pair can be used.
-_LIMITS: Final = (
+# Options that can be the reason why no pair can be used, besides those that set a limit.
+_OTHER_LIMITS: Final = (
     "--after",
     "--landing",
     "--margin",
-    "--max-kinetic-share",
-    "--max-residual",
     "--min-quality",
     "--min-rigid",
     "--tolerance",
@@ -259,8 +259,12 @@ def ask_for_states_that_show_flight(states: int, start: float, end: float) -> st
 def name_lack_of_pairs(question: RepeatedQuestion) -> str:
     """Return the statement that no pair of the run can be used, with the given options that may be the reason."""
     words = (*question.times, *question.options)
+    options_with_limit = [
+        f"--{make_option_name(name)}" for name, use in list_uses().items() if use.limit
+    ]
+    names = sorted({*_OTHER_LIMITS, *options_with_limit})
     limits = [
-        f"{name} {words[words.index(name) + 1]}" for name in _LIMITS if name in words
+        f"{name} {words[words.index(name) + 1]}" for name in names if name in words
     ]
     # This value accepts every pair, so no other value allows more.
     limits = [limit for limit in limits if limit != "--min-quality poor"]

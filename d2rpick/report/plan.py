@@ -414,7 +414,8 @@ def _list_steps_for_record(
         step = name_step_to_deck(question)
     if written_deck:
         folder = written_deck.folder
-        compare = write_command(question, "verify", "--switched", folder)
+        times = _name_times_at_rest(plan)
+        compare = write_command(question, "verify", *times, "--switched", folder)
         step = (
             f"run the deck in {folder} from t = 0, and compare the run with {compare}"
         )
@@ -426,6 +427,18 @@ def _list_steps_for_record(
         ". Then plan the remaining flights from that run (--done)" if waiting else ""
     )
     return [("next", f"{step}{again}")]
+
+
+def _name_times_at_rest(plan: RunPlan) -> tuple[str, ...]:
+    """Return the options with the first window of the next run, if nothing vibrates in it; otherwise no options.
+
+    The energies of such a run do not show when its parts were rigid.
+    """
+    first = plan.supported[0]
+    if plan.done or not (first.decision and first.decision.at_rest):
+        return ()
+    tr, td = plan.windows[0]
+    return ("--tr", f"{tr:.6g}", "--td", f"{td:.6g}")
 
 
 def _list_step_without_window(

@@ -528,8 +528,8 @@ def _check_quality(case: Case) -> Iterator[PlacedMessage]:
     "D2R210", ERROR, "a pair beyond a limit, such as --max-residual", BOTH
 )
 def _check_limits(case: Case) -> Iterator[PlacedMessage]:
-    """The pair exceeds a limit that was set with --max-residual or --max-kinetic-share, or the history does not show
-    whether it does. With the same limit, d2rpick suggest does not recommend such a pair.
+    """The pair exceeds a limit that was set by an option, such as --max-residual or --max-kinetic-share, or the history
+    does not show whether it does. With the same limit, d2rpick suggest does not recommend such a pair.
 
     Fix: Use the pair that the finding names, or one that d2rpick suggest recommends with this limit.
     """

@@ -8,13 +8,12 @@ from pathlib import Path
 
 import pytest
 
+from d2rpick.choice.pair.cures import name_parts_in_verify, omit_comparison
 from d2rpick.choice.pair.grades import VERDICTS
 from d2rpick.choice.pair.quality import (
     Cause,
     Grade,
     Quality,
-    name_parts_in_verify,
-    omit_comparison,
 )
 from tests import variants
 from tests.command import (
