@@ -6,17 +6,17 @@ from random import Random
 
 import pytest
 
-from tests.campaign import FORMATS, run_case
+from tests.campaign import INPUTS, run_case
 from tests.faults import count_inputs
 from tests.relations import RELATIONS, Chosen, find_difference, make_run
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("form", FORMATS)
+@pytest.mark.parametrize("form", INPUTS)
 def test_whatever_the_damage_an_input_is_read_or_refused(form: str) -> None:
     outcomes = Counter(
         run_case(form, 0, number)
-        for number in range(count_inputs(1_000_000) // len(FORMATS) + 1)
+        for number in range(count_inputs(1_000_000) // len(INPUTS) + 1)
     )
     print(
         f"{form}: {outcomes['read']} read, {outcomes['refused']} refused"

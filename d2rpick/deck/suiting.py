@@ -112,7 +112,7 @@ def _is_on_parts(
     from d2rpick.deck.ls_dyna_inventory import find_first_parts
 
     cards = find_element_cards(deck, searched=True)
-    other_parts = read_parts(deck).materials.keys() - set(parts)
+    other_parts = read_parts(deck).material_by_part.keys() - set(parts)
     nodes_on_parts = find_first_parts(cards, parts)
     nodes_elsewhere = find_first_parts(cards, other_parts)
     return all(

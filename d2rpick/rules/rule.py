@@ -20,7 +20,7 @@ from d2rpick.rules.example import (
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
-    from d2rpick.rules.base import Objection, Severity
+    from d2rpick.rules.base import PlacedMessage, Severity
 
 # Cards that make part 1 rigid at 0.02, and deformable at 0.09.
 THERE: Final = write_automatic_card(1, "0.02", rigid=["1"])
@@ -43,7 +43,7 @@ class Rule(NamedTuple):
     severity: Severity
     summary: str
     # Function that finds the problems in a Case, or in a RunCase if the rule applies only to Radioss.
-    check: Callable[[Any], Iterable[Objection]]
+    check: Callable[[Any], Iterable[PlacedMessage]]
     write_passing: Callable[[], Sequence[Example]]
     write_failing: Callable[[], Sequence[Example]]
     solvers: tuple[str, ...] = (LS_DYNA,)
@@ -77,7 +77,7 @@ class Rule(NamedTuple):
 
 def make_rule_decorator(
     id_: str, severity: Severity, summary: str, solvers: tuple[str, ...] = (LS_DYNA,)
-) -> Callable[[Callable[[Any], Iterable[Objection]]], Rule]:
+) -> Callable[[Callable[[Any], Iterable[PlacedMessage]]], Rule]:
     """Return a decorator that makes a rule from a function that finds objections in a case."""
 
     def write_good_deck() -> Sequence[Example]:
@@ -86,7 +86,7 @@ def make_rule_decorator(
     def write_nothing() -> Sequence[Example]:
         return []
 
-    def make_rule(check: Callable[[Any], Iterable[Objection]]) -> Rule:
+    def make_rule(check: Callable[[Any], Iterable[PlacedMessage]]) -> Rule:
         return Rule(
             id_, severity, summary, check, write_good_deck, write_nothing, solvers
         )
@@ -97,7 +97,10 @@ def make_rule_decorator(
 def set_passing(
     write_examples: Callable[[], Sequence[Example]],
 ) -> Callable[[Rule], Rule]:
-    """Return a decorator that sets the decks that must pass a rule; default: `PASS`, or `GOOD_RUN` for Radioss."""
+    """Return a decorator that sets the decks that must pass a rule.
+
+    They replace the default, `PASS` or, for Radioss, `GOOD_RUN`.
+    """
     return lambda rule: rule._replace(write_passing=write_examples)
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 from d2rpick.base.errors import name_units
 from d2rpick.deck.radioss_columns import AFTER_DELAY
 from d2rpick.deck.radioss_files import AT_REST, NOT_FOLLOWED, THROUGH_WALL
-from d2rpick.rules.base import ERROR, INFO, RADIOSS, WARNING, Objection, RunCase
+from d2rpick.rules.base import ERROR, INFO, RADIOSS, WARNING, PlacedMessage, RunCase
 from d2rpick.rules.example import (
     WINDOW,
     Example,
@@ -124,7 +124,7 @@ def _find_switching_legs(case: RunCase) -> list[RadiossLeg]:
     "engine files of a Radioss run that are not consecutive",
     (RADIOSS,),
 )
-def _check_order(case: RunCase) -> Iterator[Objection]:
+def _check_order(case: RunCase) -> Iterator[PlacedMessage]:
     """Each engine file continues the run from the end of the previous engine file. The files are numbered from 1
     without gaps, their /RUN lines have the same name, and no file ends before the previous file. Otherwise d2rpick
     cannot determine when a part is rigid. Two engine files with the same end time are not reported. Source: Altair's
@@ -176,7 +176,7 @@ def _check_order(case: RunCase) -> Iterator[Objection]:
     "/RBODY/ON or /RBODY/OFF lists a node that is not a main node",
     (RADIOSS,),
 )
-def _check_main_nodes(case: RunCase) -> Iterator[Objection]:
+def _check_main_nodes(case: RunCase) -> Iterator[PlacedMessage]:
     """/RBODY/ON and /RBODY/OFF list the main nodes of rigid bodies, not the ids of the bodies. The engine skips any
     other node without a message, so the part does not change its state. It also skips the main node of a body that
     /MERGE/RBODY merges into another body. This rule does not report a 0. d2rpick applies this rule only if it could
@@ -223,7 +223,7 @@ def _check_main_nodes(case: RunCase) -> Iterator[Objection]:
     "/RBODY/ON in a later engine file for a body that is rigid from the start",
     (RADIOSS,),
 )
-def _check_never_off(case: RunCase) -> Iterator[Objection]:
+def _check_never_off(case: RunCase) -> Iterator[PlacedMessage]:
     """A rigid body is active by default from the first engine file on. If no earlier engine file has /RBODY/OFF for it,
     the part is rigid from time 0, during the load too. If D2R402 reports a node, this rule does not. Source: Altair's
     help for /RBODY in engine files.
@@ -278,7 +278,7 @@ def _check_never_off(case: RunCase) -> Iterator[Objection]:
     "/RBODY/ON in a later engine file for a body that is rigid already",
     (RADIOSS,),
 )
-def _check_on_again(case: RunCase) -> Iterator[Objection]:
+def _check_on_again(case: RunCase) -> Iterator[PlacedMessage]:
     """A restart keeps a rigid body rigid. If /RBODY/ON activates it again, the motion stays the same, but the internal
     energy of its elements is added again: in one run the model had 173 J instead of 129 J after td. Source: runs
     computed with OpenRadioss.
@@ -322,7 +322,7 @@ def _check_on_again(case: RunCase) -> Iterator[Objection]:
     "no limit of the time step, or a large one, while parts are rigid",
     (RADIOSS,),
 )
-def _check_step_limit(case: RunCase) -> Iterator[Objection]:
+def _check_step_limit(case: RunCase) -> Iterator[PlacedMessage]:
     """If nothing deformable is left, the time step grows by 10 % per cycle without limit, and the release at td occurs
     late. /DTIX limits the time step. This rule also reports a limit above 1 % of the rigid window. It reports a missing
     limit only if every element lies in a rigid part. Source: runs computed with OpenRadioss (td was 0.26 ms late).
@@ -367,7 +367,7 @@ def _has_deformable(case: RunCase, rigid: set[int]) -> bool:
 
 @set_failing(lambda: [make_run(_MIXED)])
 @make_rule_decorator("D2R405", WARNING, "engine files with different /VERS", (RADIOSS,))
-def _check_versions(case: RunCase) -> Iterator[Objection]:
+def _check_versions(case: RunCase) -> Iterator[PlacedMessage]:
     """/VERS defines how the fields of an engine file are read. Source: Altair's help for /VERS. No run has shown that
     different versions cause errors.
 
@@ -387,7 +387,7 @@ def _check_versions(case: RunCase) -> Iterator[Objection]:
             )
 
 
-def _report_flaws(case: RunCase, *, code: str) -> Iterator[Objection]:
+def _report_flaws(case: RunCase, *, code: str) -> Iterator[PlacedMessage]:
     """Yield the flaws of the run that have the given code."""
     for flaw in case.flaws:
         if flaw.code == code:
@@ -409,7 +409,7 @@ def _report_flaws(case: RunCase, *, code: str) -> Iterator[Objection]:
     "a rigid body that no engine file switches, in a run that switches others",
     (RADIOSS,),
 )
-def _check_left_rigid(case: RunCase) -> Iterator[Objection]:
+def _check_left_rigid(case: RunCase) -> Iterator[PlacedMessage]:
     """A rigid body is active from time 0 unless the first engine file has /RBODY/OFF for it. All its nodes stay rigid
     to the end of the run, for example the wheels of a car if the engine files list only the main node of the car body.
     A body is reported if it contains whole parts and no history shows whether these deform (D2R409 reports bodies
@@ -436,7 +436,7 @@ def _check_left_rigid(case: RunCase) -> Iterator[Objection]:
     "a rigid body that no engine file switches, although its parts deform in the history",
     (RADIOSS,),
 )
-def _check_left_rigid_deforming(case: RunCase) -> Iterator[Objection]:
+def _check_left_rigid_deforming(case: RunCase) -> Iterator[PlacedMessage]:
     """The rigid body is active from time 0 (D2R408), but its parts have internal energy in the history. They deform in
     the reference run, and cannot deform in this run. If the history contains their energy and it is zero, the parts are
     meant to be rigid, and d2rpick reports nothing.
@@ -478,7 +478,7 @@ def _find_left_rigid_parts(
     "a rigid wall, an initial velocity or a rigid body whose nodes are unknown",
     (RADIOSS,),
 )
-def _report_unknown_nodes(case: RunCase) -> Iterator[Objection]:
+def _report_unknown_nodes(case: RunCase) -> Iterator[PlacedMessage]:
     """D2R406 and D2R407 check what rigid walls and initial velocities do to the nodes of rigid bodies. They evaluate
     node groups defined by nodes, parts and subsets, and the distance from a wall. They do not evaluate other groups,
     nodes moved by /TRANSFORM, or ids inside a //SUBMODEL.
@@ -510,7 +510,7 @@ def _report_unknown_nodes(case: RunCase) -> Iterator[Objection]:
     "a rigid wall that does not act on the nodes of a switched rigid body",
     (RADIOSS,),
 )
-def _check_walls(case: RunCase) -> Iterator[Objection]:
+def _check_walls(case: RunCase) -> Iterator[PlacedMessage]:
     """The starter removes the nodes of every /RBODY with Ikrem 0 from all /RWALL, even if the engine deactivates the
     body in the first engine file (warning 446). These nodes can pass through the wall. OpenRadioss applies the Ikrem of
     the /RBODY with the highest id to all bodies. With Ikrem 1 the wall acts on the nodes while the body is off, but not
@@ -544,7 +544,7 @@ def _check_walls(case: RunCase) -> Iterator[Objection]:
     "an initial velocity for the nodes of a switched rigid body but not for its main node",
     (RADIOSS,),
 )
-def _check_velocities(case: RunCase) -> Iterator[Objection]:
+def _check_velocities(case: RunCase) -> Iterator[PlacedMessage]:
     """The starter gives all nodes of an /RBODY the velocity of its main node, even if the engine deactivates the body
     in the first engine file. If the node group of /INIVEL lacks the main node, the body begins at rest, and the solver
     issues no message. An /INIV in an engine file moves an active body by its main node alone, and an inactive body by
@@ -579,7 +579,7 @@ def _make_sensed_run(*lines: str) -> Example:
     "a /SENSOR/TIME with a second number on the line of Tdelay",
     (RADIOSS,),
 )
-def _check_sensor_stop(case: RunCase) -> Iterator[Objection]:
+def _check_sensor_stop(case: RunCase) -> Iterator[PlacedMessage]:
     """Tstop has a line of its own below Tdelay. Radioss does not read a number after Tdelay on the same line, so the
     sensor stays active to the end, and the body that it switches stays deformable. Source: the format files of
     OpenRadioss, and runs computed with it.

@@ -35,7 +35,7 @@ from d2rpick.vibration.measures import TOLERATED_GROWTH
 from d2rpick.vibration.model import NOTHING_KEPT
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Iterator, Sequence
 
     from numpy.typing import NDArray
 
@@ -77,11 +77,8 @@ _NAMED: Final = 5
 # Number of neighbouring states that noise around zero does not make negative by chance.
 _NEIGHBOURS: Final = 3
 _WRONG_BY_MORE: Final = "the vibration after td is wrong by more than"
-_MORE_OFTEN: Final = "write the energies more often"
-_NAME_PARTS: Final = "name the parts to be switched with `parts`"
-_VERIFY_PARTS: Final = (
-    "judge the pair with d2rpick verify by the energy of its parts (`parts`)"
-)
+MORE_OFTEN: Final = "write the energies more often"
+NAME_PARTS: Final = "name the parts to be switched with `parts`"
 CHOOSE_TIMES_IN_FLIGHT: Final = "choose tr and td in one flight"
 _CORRECT_THE_DECK: Final = "correct the deck, and run the reference again"
 _CHECK_GIVEN_TIMES: Final = (
@@ -89,8 +86,8 @@ _CHECK_GIVEN_TIMES: Final = (
     "or let the evidence decide, without `after` and `landing`"
 )
 # End of the advice on a pair, which is omitted if a finished switched run is already available.
-_COMPARE: Final = "compare with a finished switched run"
-_OR_COMPARE: Final = f", or {_COMPARE}"
+COMPARE: Final = "compare with a finished switched run"
+OR_COMPARE: Final = f", or {COMPARE}"
 
 
 def rank_candidates(
@@ -113,7 +110,7 @@ def rank_judged(judged: Judged) -> Iterator[Candidates]:
     in order of error.
     """
     late = (judged.columns["same_swing"] != 0) | judged.near_td
-    group = np.where(judged.acceptable, late, np.int8(2)) + 3 * judged.situation_of
+    group = np.where(judged.admissible, late, np.int8(2)) + 3 * judged.situation_of
     situations = judged.situations
     room = np.repeat([get_limit_of_like_quality(each) for each in situations], 3)
     residual = judged.columns["residual"]
@@ -529,40 +526,12 @@ def _describe_unknown_direction(situation: Situation) -> Cause:
             kind=unknown,
         )
     for_modes = _describe_cure_for_modes(situation)
-    if for_modes and (not cures or for_modes != _MORE_OFTEN):
+    if for_modes and (not cures or for_modes != MORE_OFTEN):
         cures.append(for_modes)
     return Cause(
         f"{unknown}{why}",
-        f"{', '.join(cures)}{_OR_COMPARE}" if cures else _COMPARE,
+        f"{', '.join(cures)}{OR_COMPARE}" if cures else COMPARE,
         kind=unknown,
-    )
-
-
-def omit_comparison(quality: Quality) -> Quality:
-    """Return the grades without the advice to compare with a switched run, for use after this comparison."""
-
-    def omit(cure: str) -> str:
-        return _MORE_OFTEN if cure == _COMPARE else cure.removesuffix(_OR_COMPARE)
-
-    return _edit_cures(quality, omit)
-
-
-def name_parts_in_verify(quality: Quality) -> Quality:
-    """Return the grades for a check, which has no option for parts: its cure names the command that has one."""
-    return _edit_cures(quality, lambda cure: cure.replace(_NAME_PARTS, _VERIFY_PARTS))
-
-
-def _edit_cures(quality: Quality, edit: Callable[[str], str]) -> Quality:
-    """Return the grades with every cure replaced by what ``edit`` returns for it."""
-
-    def edit_grade(grade: Grade) -> Grade:
-        causes = [cause._replace(cure=edit(cause.cure)) for cause in grade.causes]
-        return grade._replace(causes=tuple(causes))
-
-    return quality._replace(
-        motion=edit_grade(quality.motion),
-        vibration=edit_grade(quality.vibration),
-        alone=edit_grade(quality.alone),
     )
 
 
@@ -596,12 +565,12 @@ def _describe_cure_for_modes(situation: Situation) -> str:
     """
     other_parts = situation.parts_to_add
     if situation.history.parts is None and not other_parts:
-        return f"{_NAME_PARTS}, if the files contain parts"
+        return f"{NAME_PARTS}, if the files contain parts"
     if other_parts:
         names = list_names([part.name for part in other_parts], most=_NAMED)
         vibrates = "it vibrates" if len(other_parts) == 1 else "they vibrate"
         return f"also make {names} rigid, because {vibrates} together with the chosen parts"
-    return "" if situation.together.not_chosen.parts else _MORE_OFTEN
+    return "" if situation.together.not_chosen.parts else MORE_OFTEN
 
 
 def _describe_wrong_tr(
@@ -660,7 +629,7 @@ def _list_causes_of_record(
         causes.append(
             Cause(
                 f"{states_text}, at least {MIN_SAMPLES_PER_PERIOD} are needed to compare energies",
-                f"{_MORE_OFTEN}, at least {MIN_SAMPLES_PER_PERIOD / states:.2g} times as often",
+                f"{MORE_OFTEN}, at least {MIN_SAMPLES_PER_PERIOD / states:.2g} times as often",
                 kind=f"the energy has fewer than {MIN_SAMPLES_PER_PERIOD} states per period",
             )
         )
