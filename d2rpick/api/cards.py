@@ -114,7 +114,7 @@ class Cards:
         "Radioss: end of the run.  [default: end of the history]", TIME, "T"
     )
     name: str | None = make_option(
-        "Radioss: name of the run.  [default: that of the deck or history, else Root]",
+        "Radioss: name of the run if neither deck nor history gives it.  [default: Root]",
         metavar="NAME",
     )
     contact: int | None = make_option(

@@ -236,8 +236,11 @@ def verify_at(situation: Situation, tr: float) -> PairVerdict:
     outside = td > situation.latest_td or (
         situation.earliest_tr is not None and td <= situation.earliest_tr
     )
-    limits_td = situation.settings.max_kinetic_share is not None
-    td_ok = None if share is None else limits_td or share <= POOR_KINETIC_SHARE
+    td_ok: bool | None = None
+    if share is not None:
+        # A limit of the user replaces the usual one; `exceeded` shows whether the td exceeds it.
+        has_own_limit = situation.settings.max_kinetic_share is not None
+        td_ok = has_own_limit or share <= POOR_KINETIC_SHARE
     if outside or any(excess.is_td_wrong for excess in exceeded):
         td_ok = False
     return PairVerdict(
@@ -268,6 +271,8 @@ def list_separate_objections(
 
 def _check_order(tr: float, td: float) -> None:
     """Raise RangeError if tr is not before td."""
+    if tr == td:
+        raise RangeError(f"tr and td are both {tr:g}; give a td after tr")
     if not tr < td:
         raise RangeError(
             f"tr {tr:g} is not before td {td:g}; give the earlier time as tr"

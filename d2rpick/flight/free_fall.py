@@ -83,7 +83,6 @@ class Laws:
         time = momenta.time
         momentum = momenta.of(members)
         self.fit = FreeFall(time, momentum)
-        self.noise = momenta.noise(members)
         self.balance = balance
         self.velocity = momenta.velocity
         parts = momenta.parts and [momenta.parts[i] for i in members]
@@ -91,6 +90,9 @@ class Laws:
         self.mass = 1.0 if momenta.velocity else momenta.mass(members)
         complete = set(momenta.moving) <= set(members)
         self.extent = float(np.ptp(momentum, axis=0).max())
+        # A state whose time is rounded seems to have the momentum of another time.
+        time_share = momenta.precision.noise(time) / max(float(np.ptp(time)), 1e-300)
+        self.noise = momenta.noise(members) + min(time_share, 1.0) * self.extent
         largest = float(np.linalg.norm(momentum, axis=1).max())
         share = min(1.0, largest / self.extent) if self.extent > 0 else 0.0
         self._enough = _ENOUGH * share if complete else min(TOLERANCE, _ENOUGH * share)

@@ -435,11 +435,16 @@ class History:
         if is_late and not self.complete:
             hint = f", where the file is cut{hint}"
         *values, first, last = format_distinctly((*times, low, high))
-        described = f"`{argument}`" if argument else subject or "time"
+        if argument:
+            described = f"`{argument}` {' '.join(values)}"
+        elif subject:
+            span = f"from {' to '.join(values)}" if len(values) > 1 else values[0]
+            described = f"{subject} {span},"
+        else:
+            described = f"time {' '.join(values)}"
         verb = "reaches" if any(low <= time <= high for time in times) else "lies"
         raise RangeError(
-            f"{', '.join(self.source)}: {described} {' '.join(values)} {verb} outside the record, "
-            f"{first} to {last}{hint}"
+            f"{', '.join(self.source)}: {described} {verb} outside the record, {first} to {last}{hint}"
         )
 
     def check_unit(self, *times: float, argument: str) -> None:

@@ -248,20 +248,38 @@ def _name_next_step(checks: Checks) -> str:
     switched = tables.make_positional(runs[:1] or [_SOME_RUN])
     hint = "" if runs else f" (folder of the switched run instead of {_SOME_RUN})"
     parts = _name_judged_parts(checks)
+    times = _name_times_at_rest(checks)
     line = tables.quote_shell_line(
-        ("d2rpick", "verify", "--switched", *switched, *parts, *history)
+        ("d2rpick", "verify", *times, "--switched", *switched, *parts, *history)
     )
     return f"run the deck, and compare the run with {line}{hint}"
 
 
 def _name_history(checks: Checks) -> tuple[tuple[str, ...], str]:
-    """Return the history next to the only deck or, if there is none, a placeholder, and a hint to replace it."""
+    """Return the given history or the one next to the only deck, otherwise a placeholder and a hint to replace it."""
+    if checks.history:
+        return tables.make_positional(checks.history), ""
     decks = [result.deck for result in checks.results]
     history = find_history_beside(decks[0]) if len(decks) == 1 else None
     if history:
         return tables.make_positional([history]), ""
     hint = f" (history of the reference run instead of {_SOME_HISTORY})"
     return (_SOME_HISTORY,), hint
+
+
+def _name_times_at_rest(checks: Checks) -> tuple[str, ...]:
+    """Return the options with the first judged window, if nothing vibrates in it; otherwise no options.
+
+    The energies of such a run do not show when its parts were rigid.
+    """
+    windows = (window for result in checks.results for window in result.windows)
+    judged = [window for window in windows if window.decision]
+    first = min(judged, key=lambda window: window.tr, default=None)
+    if first is None or first.td is None:
+        return ()
+    if first.decision is None or not first.decision.at_rest:
+        return ()
+    return ("--tr", f"{first.tr:.6g}", "--td", f"{first.td:.6g}")
 
 
 def _name_judged_parts(checks: Checks) -> tuple[str, ...]:

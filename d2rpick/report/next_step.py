@@ -5,6 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.errors import COPY_AGAIN, list_names
+from d2rpick.base.options import make_option_name
+from d2rpick.choice.options import list_uses
 from d2rpick.choice.pair.grades import DO_NOT_USE
 from d2rpick.deck.beside import SOME_NODES, SOME_PARTS, find_deck_beside
 from d2rpick.report.tables import make_positional, quote_shell_line
@@ -32,13 +34,11 @@ _FOLDER: Final = "switched"
 _FLYING: Final = "flying"
 # Statement of the last step, when the pairs of all flights have been compared.
 _NO_PAIR: Final = "no pair of this run can be used"
-# Options that can be the reason why no pair can be used.
-_LIMITS: Final = (
+# Options that can be the reason why no pair can be used, besides those that set a limit.
+_OTHER_LIMITS: Final = (
     "--after",
     "--landing",
     "--margin",
-    "--max-kinetic-share",
-    "--max-residual",
     "--min-quality",
     "--min-rigid",
     "--tolerance",
@@ -259,9 +259,15 @@ def ask_for_states_that_show_flight(states: int, start: float, end: float) -> st
 def name_lack_of_pairs(question: RepeatedQuestion) -> str:
     """Return the statement that no pair of the run can be used, with the given options that may be the reason."""
     words = (*question.times, *question.options)
-    limits = [
-        f"{name} {words[words.index(name) + 1]}" for name in _LIMITS if name in words
+    options_with_limit = [
+        f"--{make_option_name(name)}" for name, use in list_uses().items() if use.limit
     ]
+    names = sorted({*_OTHER_LIMITS, *options_with_limit})
+    limits = [
+        f"{name} {words[words.index(name) + 1]}" for name in names if name in words
+    ]
+    # This value accepts every pair, so no other value allows more.
+    limits = [limit for limit in limits if limit != "--min-quality poor"]
     if not limits:
         return _NO_PAIR
     values = "another value" if len(limits) == 1 else "other values"
@@ -322,7 +328,7 @@ def name_way_out_of_run(
         )
     cure = decision.cure_without_other_times if decision else ""
     if cure:
-        return f"{no_pair}: {cure}"
+        return f"{no_pair}: {cure}{_name_way_to_switched_run(cure, question)}"
     if situation.history.parts:
         line = write_command(question._replace(parts=()), "parts")
         return f"{no_pair} with these parts; find other parts with {line}"
@@ -337,6 +343,29 @@ def name_step_after_switched_run(question: RepeatedQuestion) -> str:
     return (
         f"compare this run with its reference run: {quote_shell_line(words)} ({hint})"
     )
+
+
+def _name_way_to_switched_run(cure: str, question: RepeatedQuestion) -> str:
+    """Return the command that writes the deck of a switched run if a ``cure`` asks for one; otherwise ""."""
+    # Imported here, because a card without a history needs no numpy.
+    from d2rpick.choice.pair.quality import COMPARE
+
+    if COMPARE not in cure or not question.parts:
+        return ""
+    deck = name_deck_of_run(question)
+    given = () if "--deck" in question.options else ("--deck", deck.name)
+    words = (*given, "--min-quality", "poor", "--write-deck", _FOLDER)
+    options = _leave_out(question.options, "--min-quality")
+    line = write_command(question._replace(options=options), "plan", *words)
+    return f". This writes the deck of such a run: {line}{deck.hint if given else ''}"
+
+
+def _leave_out(words: Sequence[str], name: str) -> tuple[str, ...]:
+    """Return the words of a command without an option and its value."""
+    if name not in words:
+        return tuple(words)
+    position = words.index(name)
+    return (*words[:position], *words[position + 2 :])
 
 
 def name_step_after_refusal(

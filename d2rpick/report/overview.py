@@ -11,7 +11,11 @@ from d2rpick.flight import SOURCES
 from d2rpick.flight.flight import NEVER_FLIES
 from d2rpick.report import keys, tables
 from d2rpick.report.fields import Document, Field, get_kind, many, maybe, one_of, row
-from d2rpick.report.next_step import ask_for_states_that_show_flight
+from d2rpick.report.formats import RepeatedQuestion
+from d2rpick.report.next_step import (
+    ask_for_states_that_show_flight,
+    name_step_after_switched_run,
+)
 from d2rpick.report.situation import (
     list_health_columns,
     list_health_measures,
@@ -161,6 +165,9 @@ def list_overview_lines(overview: Overview) -> list[tuple[str, str]]:
         return [*lines, ("next", _name_step_to_energy(overview))]
     if overview.verdict == DO_NOT_USE:
         is_known = overview.unjudged or overview.rigid
+        if overview.rigid and not overview.unjudged:
+            question = RepeatedQuestion(files=overview.source)
+            return [*lines, ("next", name_step_after_switched_run(question))]
         if is_known:
             return lines
         if overview.is_loaded:

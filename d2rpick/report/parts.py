@@ -204,6 +204,8 @@ _SPARE: Final = (
     "rotation error [deg]",
     "energy scatter",
 )
+# Advice if the history contains no parts.
+_NAME_HISTORY_WITH_PARTS: Final = "name a history with parts: matsum or binout of LS-DYNA, T01 of Radioss with /TH/PART"
 # Displayed verdicts on parts, keyed by verdict.
 _VERDICTS: Final = {"switch": "yes", "keep": "no"}
 # Displayed names of the sets, keyed by set name.
@@ -444,6 +446,11 @@ def name_verdict(row: PartRow) -> str:
 def list_verdict_on_set(answer: Parts) -> list[tuple[str, str]]:
     """Return which parts to make rigid, why, and what that saves, as (name, sentence) pairs."""
     best = answer.recommended
+    if best is None and not answer.files.parts:
+        return [
+            ("make rigid", "unknown: this history does not contain single parts"),
+            ("to improve", _NAME_HISTORY_WITH_PARTS),
+        ]
     if best is None and answer.inventory is None:
         return [
             (
@@ -516,6 +523,9 @@ def _name_step_without_set(answer: Parts, question: RepeatedQuestion) -> str:
     """Return the step if no set is recommended: to the missing deck, or to the verdict on all parts."""
     # The options name a deck that was not used.
     of_files = RepeatedQuestion(files=question.files)
+    if not answer.files.parts:
+        line = write_command(question, "plan")
+        return f"judge the energy of the whole model with {line}"
     if answer.inventory is None:
         deck = name_deck_of_run(question)
         line = write_command(of_files, "parts", "--deck", deck.name)

@@ -393,7 +393,8 @@ def _list_steps_for_record(
     plan: RunPlan, question: RepeatedQuestion, written_deck: WrittenDeck | None
 ) -> list[tuple[str, str]]:
     """Return the next commands for the part of the run that was read."""
-    if not plan.windows or _uses_only_poor_windows(plan):
+    is_refused = not plan.windows or _uses_only_poor_windows(plan)
+    if is_refused and not written_deck:
         return _list_step_without_window(plan, question)
     waiting = any(row.status == "re-plan" for row in plan.flights)
     cards = name_step_to_card(
@@ -413,7 +414,8 @@ def _list_steps_for_record(
         step = name_step_to_deck(question)
     if written_deck:
         folder = written_deck.folder
-        compare = write_command(question, "verify", "--switched", folder)
+        times = _name_times_at_rest(plan)
+        compare = write_command(question, "verify", *times, "--switched", folder)
         step = (
             f"run the deck in {folder} from t = 0, and compare the run with {compare}"
         )
@@ -427,12 +429,25 @@ def _list_steps_for_record(
     return [("next", f"{step}{again}")]
 
 
+def _name_times_at_rest(plan: RunPlan) -> tuple[str, ...]:
+    """Return the options with the first window of the next run, if nothing vibrates in it; otherwise no options.
+
+    The energies of such a run do not show when its parts were rigid.
+    """
+    first = plan.supported[0]
+    if plan.done or not (first.decision and first.decision.at_rest):
+        return ()
+    tr, td = plan.windows[0]
+    return ("--tr", f"{tr:.6g}", "--td", f"{td:.6g}")
+
+
 def _list_step_without_window(
     plan: RunPlan, question: RepeatedQuestion
 ) -> list[tuple[str, str]]:
     """Return the command to type next if no window of a plan can be used now."""
     rows = [row for row in plan.flights if row.answer and not row.done]
-    if plan.done:
+    is_partly_rigid = any(caution.code == "partly-rigid" for caution in plan.cautions)
+    if plan.done or is_partly_rigid:
         return [("next", name_step_after_switched_run(question))]
     if not rows:
         if not plan.flights and not plan.history.complete:

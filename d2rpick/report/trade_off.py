@@ -72,6 +72,12 @@ _SPARE: Final = (
     "kinetic fraction",
 )
 
+# Error of a td if no model of the vibration is known, and its meaning.
+_LEVEL_SHORTFALL: Final = "level shortfall"
+_SHORTFALL_MEANS: Final = (
+    "part of the largest deformation that is missing at td, judged by the energy alone; the vibration may be wrong by "
+    "more"
+)
 _NONE_ADMISSIBLE: Final = "no td in the range has an admissible tr"
 _NONE_BETTER: Final = "no other td in the range is better"
 _NOT_HALVED: Final = "no other td in the range halves this error without giving up more than half of the rigid time"
@@ -343,8 +349,8 @@ def _describe_cost_change(start: Offer, step: Offer) -> str:
     if start.saving is not None and step.saving is not None:
         longer = start.saving - step.saving
         if abs(longer) < _NO_CHANGE:
-            return "costs no CPU time"
-        return f"{'costs' if longer > 0 else 'saves'} {abs(longer):.1%} of the reference's CPU time"
+            return "needs the same CPU time"
+        return f"needs {1 - step.saving:.1%} of the CPU time of the reference run instead of {1 - start.saving:.1%}"
     assert start.rigid_time is not None
     assert step.rigid_time is not None
     change = step.rigid_time / start.rigid_time - 1
@@ -360,7 +366,7 @@ def _format_offer_error(offer: Offer) -> str:
     if offer.error is None:
         return "an energy above twice its mean"
     if offer.basis == "energy":
-        return f"level shortfall {tables.format_measure(offer.error)}"
+        return f"{_LEVEL_SHORTFALL} {tables.format_measure(offer.error)}"
     return f"residual {tables.format_measure(offer.error)}"
 
 
@@ -414,12 +420,15 @@ def _name_errors(offers: Sequence[Offer]) -> str:
     is_by_level = {offer.basis == "energy" for offer in offers}
     if len(is_by_level) > 1:
         return "error"
-    return "level shortfall" if True in is_by_level else "residual"
+    return _LEVEL_SHORTFALL if True in is_by_level else "residual"
 
 
 def list_offer_reasons(offers: Sequence[Offer]) -> list[tuple[str, str]]:
-    """Return the reasons for the verdicts on the proposed pairs, each with its number in the table."""
-    return list_numbered_reasons(_number_offer_reasons(offers))
+    """Return the meaning of the errors, and the reasons for the verdicts, each with its number in the table."""
+    reasons = list_numbered_reasons(_number_offer_reasons(offers))
+    if any(offer.basis == "energy" and offer.error is not None for offer in offers):
+        return [*reasons, (_LEVEL_SHORTFALL, _SHORTFALL_MEANS)]
+    return reasons
 
 
 def _number_offer_reasons(offers: Sequence[Offer]) -> dict[str, int]:

@@ -283,7 +283,7 @@ class Case:
         return next(
             (
                 value
-                for card, value in self.supporting
+                for card, value in self.end_and_intervals
                 if card.name == "CONTROL_TERMINATION"
             ),
             None,
@@ -335,7 +335,7 @@ class Case:
         return find_unswitchable_in_ls_dyna(self.deck, self.parts)
 
     @cached_property
-    def supporting(self) -> tuple[tuple[Card, Value[float]], ...]:
+    def end_and_intervals(self) -> tuple[tuple[Card, Value[float]], ...]:
         """Return ENDTIM and the DT of the energy databases, each with its card."""
         names = ("CONTROL_TERMINATION", "DATABASE_GLSTAT", "DATABASE_MATSUM")
         cards = [

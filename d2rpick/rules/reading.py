@@ -153,11 +153,11 @@ def _check_fields(case: Case) -> Iterator[PlacedMessage]:
     if case.sets:
         for field, problem in (*case.parts.problems, *_find_unreadable_members(case)):
             yield field, f"{problem}; it is needed to know which parts are switched"
-        for support, value in case.supporting:
+        for card_of_time, value in case.end_and_intervals:
             if value.problem:
                 yield (
                     value.field,
-                    f"{value.problem}; *{support.name} is needed to judge the switching times",
+                    f"{value.problem}; *{card_of_time.name} is needed to judge the switching times",
                 )
 
 
@@ -228,7 +228,9 @@ def _check_parameters(case: Case) -> Iterator[PlacedMessage]:
         if value.parameters
     ]
     if case.sets:
-        uses += [(card, value) for card, value in case.supporting if value.parameters]
+        uses += [
+            (card, value) for card, value in case.end_and_intervals if value.parameters
+        ]
     reported: set[tuple[Card, str]] = set()
     for card, value in uses:
         for name in card.scope.closure(value.parameters):

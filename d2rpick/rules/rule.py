@@ -97,7 +97,10 @@ def make_rule_decorator(
 def set_passing(
     write_examples: Callable[[], Sequence[Example]],
 ) -> Callable[[Rule], Rule]:
-    """Return a decorator that sets the decks that must pass a rule; default: `PASS`, or `GOOD_RUN` for Radioss."""
+    """Return a decorator that sets the decks that must pass a rule.
+
+    They replace the default, `PASS` or, for Radioss, `GOOD_RUN`.
+    """
     return lambda rule: rule._replace(write_passing=write_examples)
 
 

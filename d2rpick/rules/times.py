@@ -303,13 +303,17 @@ def _find_mixed_units(times: list[float], end: float, run_end: str) -> str | Non
     latest = max(later)
     earliest = min(later)
     if 10 * end < latest < _THOUSAND * end and earliest >= end:
-        direction = "later: milliseconds for seconds"
+        size = "larger: milliseconds for seconds"
     elif end / 50 <= _THOUSAND * latest < end:
-        direction = "earlier: seconds for milliseconds"
+        size = "smaller: seconds for milliseconds"
     else:
         return None
-    problem = f"the switching times reach {latest:g} but {run_end}, about 1000 times {direction}"
-    return f"{problem}? give both in the same unit"
+    problem = (
+        f"the switching times reach only {latest:g}"
+        if size.startswith("smaller")
+        else f"the switching times reach {latest:g}"
+    )
+    return f"{problem} but {run_end}: they are about 1000 times {size}? give both in the same unit"
 
 
 @set_passing(
@@ -524,8 +528,8 @@ def _check_quality(case: Case) -> Iterator[PlacedMessage]:
     "D2R210", ERROR, "a pair beyond a limit, such as --max-residual", BOTH
 )
 def _check_limits(case: Case) -> Iterator[PlacedMessage]:
-    """The pair exceeds a limit that was set with --max-residual or --max-kinetic-share, or the history does not show
-    whether it does. With the same limit, d2rpick suggest does not recommend such a pair.
+    """The pair exceeds a limit that was set by an option, such as --max-residual or --max-kinetic-share, or the history
+    does not show whether it does. With the same limit, d2rpick suggest does not recommend such a pair.
 
     Fix: Use the pair that the finding names, or one that d2rpick suggest recommends with this limit.
     """

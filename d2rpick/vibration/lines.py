@@ -41,6 +41,10 @@ _MOST_LAGS: Final = 340
 # _FEWEST_STATES: smallest number of states in the uniform grid.
 # _MOST_STATES: largest number of states in the uniform grid.
 _STATES_PER_PERIOD, _FEWEST_STATES, _MOST_STATES = 4.0, 64, 2000
+# The means over at least _FEW_BLOCKS blocks show whether an energy is unpredictable.
+# _MANY_BLOCKS: smallest number of blocks that are tested in this way, as a multiple of _FEW_BLOCKS [-].
+# _MOST_SWING: smallest fraction of the energy's oscillation that these means must show [-].
+_FEW_BLOCKS, _MANY_BLOCKS, _MOST_SWING = 140, 4, 0.5
 # Times are treated as evenly spaced if they deviate by at most this fraction of an interval [-].
 _EVEN: Final = 1e-3
 # A line exceeds white noise if its power is at least this multiple of the median power [-].
@@ -91,6 +95,15 @@ class Grid(NamedTuple):
         """Return a grid with some successive blocks."""
         return self._replace(time=self.time[blocks], energy=self.energy[blocks])
 
+    def coarsen(self, factor: int) -> Grid:
+        """Return the means over blocks that are ``factor`` times as long; the last blocks may be left out."""
+        count = self.time.size // factor
+        time, energy = (
+            column[: count * factor].reshape(count, factor).mean(axis=1)
+            for column in (self.time, self.energy)
+        )
+        return self._replace(time=time, energy=energy, size=factor * self.size)
+
     def waves(self, poles: Complex) -> Complex:
         """Return exp(p (t - t_0)) at the m times t of the grid, where t_0 is the first time; shape (m, poles) [-].
 
@@ -138,17 +151,14 @@ def make_even_grid(time: Samples, energy: Samples) -> Grid:
     wanted = np.clip(_STATES_PER_PERIOD * fastest, _FEWEST_STATES, _MOST_STATES)
     size = max(1, int(time.size // wanted))
     count = time.size // size
-    middles, means = (
-        column[: count * size].reshape(count, size).mean(axis=1)
-        for column in (even, values)
-    )
-    return Grid(
-        middles,
-        means,
+    states = Grid(
+        even,
+        values,
         spacing=float(even[1] - even[0]),
-        size=size,
+        size=1,
         strong=count / max(strongest, 1),
     )
+    return states.coarsen(size)
 
 
 def _count_turns(time: Samples, values: Samples) -> tuple[float, float]:
@@ -291,21 +301,65 @@ class Prediction(NamedTuple):
         )
 
 
+class _Trial(NamedTuple):
+    """A number of exponentials (``order``) with the error of its prediction, and its spectrum of the first part."""
+
+    missed: float
+    order: int
+    every_decay: bool
+    of_first: Spectrum
+
+
 def predict(grid: Grid) -> Prediction | None:
     """Find the spectral lines that best predict the energy; None if the record is too short or does not oscillate."""
-    reach = grid.time - grid.time[0]
-    if grid.time.size < _FEWEST_STATES // 2:
+    swing = _measure_swing(grid)
+    best = _find_best_order(grid, swing)
+    if best is None:
         return None
-    swing = float(
-        np.std(grid.energy - np.polyval(np.polyfit(reach, grid.energy, 2), reach))
-    )
-    if not swing > 0:
+    poles = _SignalSpace.of(grid).poles(best.order)
+    whole = fit_spectrum(grid, poles, grid.span, every_decay=best.every_decay)
+    return Prediction(whole, best.of_first, best.missed, swing)
+
+
+def is_unpredictable(grid: Grid, most_missed: float) -> bool:
+    """Return True if means over few long blocks already show that lines predict the energy badly.
+
+    A mean of a sum of lines is again a sum of lines with the same decay rates, so what predicts an energy predicts its
+    means. This test takes a tenth of the time of a prediction. It is not made if there are not many more blocks, or if
+    the means hide most of the energy's oscillation.
+
+    Parameters
+    ----------
+    grid : Grid
+    most_missed : float
+        Largest prediction error that is not bad [-].
+    """
+    if grid.time.size < _MANY_BLOCKS * _FEW_BLOCKS:
+        return False
+    coarse = grid.coarsen(grid.time.size // _FEW_BLOCKS)
+    swing = _measure_swing(coarse)
+    if swing < _MOST_SWING * _measure_swing(grid):
+        return False
+    best = _find_best_order(coarse, swing)
+    return best is not None and best.missed > most_missed
+
+
+def _measure_swing(grid: Grid) -> float:
+    """Return the standard deviation of the energy about its trend [energy]."""
+    reach = grid.time - grid.time[0]
+    trend = np.polyval(np.polyfit(reach, grid.energy, 2), reach)
+    return float(np.std(grid.energy - trend))
+
+
+def _find_best_order(grid: Grid, swing: float) -> _Trial | None:
+    """Find the number of exponentials with which the first part of a grid predicts the rest best; None as `predict`."""
+    if grid.time.size < _FEWEST_STATES // 2 or not swing > 0:
         return None
     size_of_first = int(FIRST_PART * grid.time.size)
     first = grid.some(slice(size_of_first))
     rest = grid.some(slice(size_of_first, None))
     space = _SignalSpace.of(first)
-    tried: list[tuple[float, int, bool, Spectrum]] = []
+    tried: list[_Trial] = []
     for order in _ORDERS:
         if order > first.time.size // 3 or order + 2 > space.size:
             break
@@ -315,16 +369,11 @@ def predict(grid: Grid) -> Prediction | None:
             predicted = _average_blocks(spectrum, rest)
             error = float(np.sqrt(np.mean((predicted - rest.energy) ** 2)))
             missed = float(np.hypot(error, spectrum.error)) / swing
-            if not tried or missed < _get_needed(tried[-1][3]) * tried[-1][0]:
-                tried.append((missed, order, every_decay, spectrum))
-        if tried[-1][0] < PERFECT:
+            if not tried or missed < _get_needed(tried[-1].of_first) * tried[-1].missed:
+                tried.append(_Trial(missed, order, every_decay, spectrum))
+        if tried[-1].missed < PERFECT:
             break
-    if not tried:
-        return None
-    missed, order, every_decay, of_first = tried[-1]
-    poles = _SignalSpace.of(grid).poles(order)
-    whole = fit_spectrum(grid, poles, grid.span, every_decay=every_decay)
-    return Prediction(whole, of_first, missed, swing)
+    return tried[-1] if tried else None
 
 
 def _get_needed(spectrum: Spectrum) -> float:

@@ -60,7 +60,7 @@ if TYPE_CHECKING:
     Mask = NDArray[np.bool_]
 
 # Smallest number of states in which spectral lines are identified.
-_FEWEST_STATES: Final = 32
+FEWEST_STATES: Final = 32
 # A static energy up to this fraction of the mean vibration energy may be a fitting error [-].
 _NO_STATIC: Final = 0.12
 # Smallest divisor of energies, as a fraction of the energy range of the record [-].
@@ -480,11 +480,22 @@ def identify_modal(
     >>> bool(abs(float(found.separation(1.0, 4.0)) - np.dot([1.0, 0.5, 0.3], np.square(apart))) < 1e-6)
     True
     """
-    if time.size < _FEWEST_STATES:
+    if time.size < FEWEST_STATES:
         return None
-    grid = make_even_grid(time, energy)
+    window = float(time[0]), float(time[-1])
+    return identify_in_grid(make_even_grid(time, energy), window, kinetic=kinetic)
+
+
+def identify_in_grid(
+    grid: Grid, window: tuple[float, float], *, kinetic: bool = False
+) -> ModalVibration | None:
+    """Identify the modes from the energy on an even ``grid``, as `identify_modal` does.
+
+    ``window`` contains the times of the first and last states [time]; the grid of block means is shorter.
+    """
     prediction = predict(grid)
-    if prediction is None or prediction.swing <= RESOLVED * float(np.abs(energy).max()):
+    highest = float(np.abs(grid.energy).max())
+    if prediction is None or prediction.swing <= RESOLVED * highest:
         return None
     # If the prediction error is larger, the record is refused, whatever its lines.
     if prediction.missed <= MOST_MISSED:
@@ -496,7 +507,6 @@ def identify_modal(
         prediction = prediction.count_slow_as_mean(grid.span)
     if not prediction.spectrum.lines.poles.size:
         return None
-    window = float(time[0]), float(time[-1])
     if kinetic:
         return _read(grid, prediction.turned(), window, kinetic=True)
     return _read(grid, prediction, window)

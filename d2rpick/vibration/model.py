@@ -284,10 +284,11 @@ def find_moments(
     Parameters
     ----------
     vibrations : sequence of length n
+        Vibration around each td.
     tolerance : float
-        [-]
+        Largest level error of an extremum that is a candidate [-].
     since : sequence of length n
-        [time]
+        Earliest candidate time for each td [time].
     """
     moments: dict[int, Moments] = {}
     for positions in _group_alike(vibrations):

@@ -1,6 +1,7 @@
-"""Find candidate times for tr: times at which the total energy equals that at td, with their errors.
+"""Find candidate times for tr, with their errors.
 
-The energy around a td is known from its samples or from modes that describe the samples.
+At most of them the total energy equals that at td. Others are extrema of the energy near this level, and times at which
+the deformations match best. The energy around a td is known from its samples or from modes that describe the samples.
 """
 
 from __future__ import annotations

@@ -15,6 +15,7 @@ import numpy as np
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.vibration.fitting import measure_structure
 from d2rpick.vibration.lines import (
+    FIRST_PART,
     MOST_GROWTH,
     PERFECT,
     are_lines,
@@ -62,7 +63,8 @@ _OF_MEAN: Final = 1.0
 def refine_prediction(grid: Grid, prediction: Prediction) -> Prediction:
     """Return the prediction with refined lines of the whole record, if these lines leave only noise as the misfit.
 
-    The lines of the first part are not refined, because they only serve to test the others.
+    The same lines are then refined in the first part of the record, whose own search may have missed one of two lines
+    that only the whole record separates.  Lines that a linear structure does not have differ there.
     """
     spectrum = prediction.spectrum
     if spectrum.error <= PERFECT * prediction.swing or not spectrum.lines.poles.size:
@@ -82,8 +84,17 @@ def refine_prediction(grid: Grid, prediction: Prediction) -> Prediction:
     spectrum = _remove_needless_lines(grid, spectrum)
     # If the remaining misfit is not noise, the refined lines may be fitted to a load that is still ending.
     # The prediction then keeps its unrefined lines.
-    is_noise = measure_structure(spectrum.rest) == 0
-    return prediction._replace(spectrum=spectrum) if is_noise else prediction
+    if measure_structure(spectrum.rest) > 0:
+        return prediction
+    of_first_part = _refine_in_first_part(grid, spectrum)
+    return prediction._replace(spectrum=spectrum, of_first_part=of_first_part)
+
+
+def _refine_in_first_part(grid: Grid, spectrum: Spectrum) -> Spectrum:
+    """Return the lines of the record as the first part of the record alone shows them."""
+    first_part = grid.some(slice(int(FIRST_PART * grid.time.size)))
+    start = fit_weights(first_part, spectrum.lines.poles, spectrum.mean.poles)
+    return _refine_spectrum(first_part, start)
 
 
 def _refine_spectrum(grid: Grid, spectrum: Spectrum) -> Spectrum:

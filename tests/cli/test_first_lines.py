@@ -8,7 +8,7 @@ import pytest
 
 import d2rpick
 from d2rpick.choice.options import Limit
-from d2rpick.choice.switched.comparison import MOST_MOMENTUM_ERROR
+from d2rpick.choice.switched.same_model import MOST_MOMENTUM_ERROR
 from d2rpick.report.formats import DisplayOptions
 from tests.command import MATSUM, ROOT, put, run, run_json
 

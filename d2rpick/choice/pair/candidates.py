@@ -190,8 +190,8 @@ class Judged:
         ]
 
     @cached_property
-    def acceptable(self) -> NDArray[np.bool_]:
-        """True for each candidate without objections, shape (n,)."""
+    def admissible(self) -> NDArray[np.bool_]:
+        """True for each candidate without objections, shape (n,); see `Candidate` for the words."""
         return np.asarray(
             ~np.logical_or.reduce([objection.holds for objection in self.objections])
         )
@@ -199,7 +199,7 @@ class Judged:
     @property
     def recommendable(self) -> NDArray[np.bool_]:
         """True for each candidate that ``suggest`` and ``verify`` accept: it has no objections and exceeds no limit."""
-        return self.acceptable & self.within_limits
+        return self.admissible & self.within_limits
 
     @property
     def within_limits(self) -> NDArray[np.bool_]:

@@ -110,7 +110,7 @@ def rank_judged(judged: Judged) -> Iterator[Candidates]:
     in order of error.
     """
     late = (judged.columns["same_swing"] != 0) | judged.near_td
-    group = np.where(judged.acceptable, late, np.int8(2)) + 3 * judged.situation_of
+    group = np.where(judged.admissible, late, np.int8(2)) + 3 * judged.situation_of
     situations = judged.situations
     room = np.repeat([get_limit_of_like_quality(each) for each in situations], 3)
     residual = judged.columns["residual"]

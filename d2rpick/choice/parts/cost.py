@@ -293,9 +293,11 @@ def read_weights(path: str) -> Weights:
         content = Path(path).read_bytes()
         values = tomllib.loads(content.decode("utf-8"))
     except (OSError, UnicodeDecodeError, ValueError, RecursionError) as error:
+        is_binary = isinstance(error, UnicodeDecodeError)
         reason = getattr(error, "strerror", None) or error
+        reason = "binary data" if is_binary else reason
         raise ConfigurationError(
-            f"{path}: cannot be read ({reason}), a TOML file of weights was expected"
+            f"{path}: cannot be read ({reason}), a TOML file of weights was expected; d2rpick calibrate writes one"
         ) from None
     unknown = [key for key in values if key not in _KEYS]
     if unknown:

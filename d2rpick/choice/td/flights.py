@@ -61,6 +61,9 @@ def find_longest_flight(
         if held:
             reason = held
             cure = "name parts that nothing holds"
+        elif not history.energy.any():
+            reason = f"{_NO_FLIGHT}: the energy is 0 in all states"
+            cure = "choose the internal energy with `energy`"
         elif settings.after is not None:
             cure = "give `td`"
         elif not history.complete:
