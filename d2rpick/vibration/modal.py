@@ -114,10 +114,10 @@ class ModeAtTd(NamedTuple):
 
 
 class _Course(NamedTuple):
-    """Elastic energies [energy] at times [time] so close together that linear interpolation is accurate enough."""
+    """How far the elastic energy is above its mean [energy], at times [time] close enough for linear interpolation."""
 
     time: Samples
-    energy: Samples
+    fluctuation: Samples
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -257,10 +257,17 @@ class ModalVibration:
 
     def separation(self, tr: Samples | float, td: Samples | float) -> Samples:
         """Return the elastic energy of the difference of the deformations at tr and td [energy]."""
-        apart = (
-            self.elastic_energy(tr) - 2 * self.overlap(tr, td) + self.elastic_energy(td)
-        )
-        return np.maximum(apart, 0.0)
+        return self.compare(tr, td)[0]
+
+    def compare(
+        self, tr: Samples | float, td: Samples | float
+    ) -> tuple[Samples, Samples]:
+        """Return `separation` and `overlap` from one evaluation [energy]."""
+        pairs = self.reading.compare(tr, td)
+        at_tr = np.maximum(pairs.elastic_energy_tr, 0.0)
+        at_td = np.maximum(pairs.elastic_energy_td, 0.0)
+        separation = np.maximum(at_tr - 2 * pairs.overlap + at_td, 0.0)
+        return separation, pairs.overlap
 
     def profile(self, td: float) -> Profile:
         """Return frozen-deformation errors at each ``time`` before ``td`` [-]; values shared by all td are cached."""
@@ -269,11 +276,8 @@ class ModalVibration:
         middle = (self.time[:last] + td) / 2
         at_td = float(self.elastic_energy(td))
         coherence = (earlier[:last] @ self.reading.later(td)).real
-        overlap = (
-            np.interp(middle, finer.time, finer.energy)
-            - self.reading.level(middle) / 2
-            + coherence / 2
-        )
+        fluctuation = np.interp(middle, finer.time, finer.fluctuation)
+        overlap = fluctuation + coherence / 2
         bound = np.sqrt(elastic[:last] * at_td)
         separation = elastic[:last] - 2 * np.clip(overlap, -bound, bound) + at_td
         return Profile(
@@ -287,10 +291,10 @@ class ModalVibration:
         finer = np.linspace(
             self.time[0], self.time[-1], _FINER * (self.time.size - 1) + 1
         )
-        course = _Course(finer, self.reading.elastic_energy(finer))
+        energy = self.reading.elastic_energy(finer)
         return (
-            np.maximum(course.energy[::_FINER], 0.0),
-            course,
+            np.maximum(energy[::_FINER], 0.0),
+            _Course(finer, energy - self.reading.level(finer) / 2),
             self.reading.earlier(self.time),
         )
 
@@ -308,12 +312,12 @@ class ModalVibration:
         side.
         """
         reading, level = self.reading, self.reading.level(td)
-        squared = reading.residual_squared(tr, td)
-        lines = (
-            np.abs(reading.coherence(tr, td) - self.of_first_part.coherence(tr, td))
-            / level
-        )
-        deviation = measures.BAND_DEVIATIONS * self.scatter.compute_deviation(tr, td)
+        pairs = reading.compare(tr, td)
+        squared = reading.square_residual(pairs, td)
+        of_first_part = self.of_first_part.coherence(tr, td)
+        lines = np.abs(pairs.coherence - of_first_part) / level
+        scatter = self.scatter.compute_deviation(tr, td, squared)
+        deviation = measures.BAND_DEVIATIONS * scatter
         # The accuracy of the lines follows from the fit and from a second fit to the first part of the record.
         of_lines = np.minimum(
             np.maximum(deviation, lines), np.maximum(squared, _MOST_OPPOSED)

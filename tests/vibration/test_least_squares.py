@@ -11,7 +11,7 @@ def make_model(condition: float, seed: int) -> np.ndarray:
     random = np.random.default_rng(seed)
     left = np.linalg.qr(random.normal(size=(40, 6)))[0]
     right = np.linalg.qr(random.normal(size=(6, 6)))[0]
-    return left * np.geomspace(1.0, 1 / condition, 6) @ right
+    return np.asarray(left * np.geomspace(1.0, 1 / condition, 6) @ right)
 
 
 @pytest.mark.parametrize("seed", range(5))
