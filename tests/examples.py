@@ -1,13 +1,14 @@
 """Find the examples in README.md and docs, and run them as a reader would type them.
 
-``python -m tests.examples`` runs all sessions and writes their output into the pages.  Check the difference before you
-commit it.
+``python -m tests.examples`` runs all sessions and writes their output into the pages, or only into the pages given as
+arguments.  Check the difference before you commit it.
 """
 
 import contextlib
 import re
 import shlex
 import shutil
+import sys
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -29,6 +30,8 @@ _SESSION = re.compile(
 )
 # The last digits of a number at full precision depend on the machine.
 _FULL_PRECISION = re.compile(r"\d+\.\d{13,}(?:e[+-]\d+)?")
+# The pages show what a terminal of this width shows.
+_TERMINAL = {"COLUMNS": "100"}
 _NEXT_TO_NOTHING = re.compile(r"\b\d\.\d+e-(?:0[5-9]|[1-9]\d)\b")
 
 
@@ -81,7 +84,7 @@ def make_anchor(heading: str) -> str:
 def run_shown_command(command: str) -> str:
     """Run a command line and return its output."""
     _, *args = shlex.split(command.replace("\\\n", ""))
-    result = run(*args)
+    result = run(*args, env=_TERMINAL)
     return f"{result.stderr}{result.stdout}".rstrip("\n")
 
 
@@ -117,7 +120,8 @@ def enter_reader_folder() -> Iterator[None]:
 
 
 if __name__ == "__main__":
-    for path in PAGES.values():
+    chosen = {str(Path(name)) for name in sys.argv[1:]} or set(PAGES)
+    for path in (PAGES[name] for name in PAGES if name in chosen):
         with enter_reader_folder():
             new = renewed(path.read_text("utf-8"))
         path.write_text(new, "utf-8")

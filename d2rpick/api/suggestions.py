@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from d2rpick.api.runs import Run
     from d2rpick.choice.pair.candidates import Pair
     from d2rpick.choice.parts.cost import Weights
+    from d2rpick.choice.switched.switch_times import SwitchedWindow
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -315,9 +316,11 @@ def verify(
 def check_pair(tr: float | None, td: float | None, switched: object) -> None:
     """Refuse an incomplete pair. Both times are needed unless a switched run defines them."""
     if not switched and (tr is None or td is None):
-        raise ArgumentError(
-            f"give `{'tr' if tr is None else 'td'}` too, or a finished switched run"
-        )
+        if tr is None and td is None:
+            times = "`tr` and `td`"
+        else:
+            times = "`tr` too" if tr is None else "`td` too"
+        raise ArgumentError(f"give {times}, or a finished switched run as `switched`")
 
 
 def judge_pair(
@@ -332,18 +335,18 @@ def judge_pair(
     switched_reference = switched and question.reference.like(
         switched.files, question.selection
     )
-    if switched_reference and (tr is None or td is None):
-        from d2rpick.choice.switched.comparison import find_switch_times
-
-        switch_times = find_switch_times(
-            switched_reference.history, question.reference.history
+    tr_is_read = tr is None
+    windows: tuple[SwitchedWindow, ...] = ()
+    if switched_reference:
+        from d2rpick.choice.switched.switch_times import (
+            find_switched_windows,
+            read_switch_times,
         )
-        for time in switch_times:
-            question.reference.history.check(
-                time, subject="the switch time of the switched run,"
-            )
-        tr = switch_times[0] if tr is None else tr
-        td = switch_times[1] if td is None else td
+
+        history = question.reference.history
+        windows = find_switched_windows(switched_reference, history)
+        if tr is None or td is None:
+            tr, td = read_switch_times(switched_reference, history, windows, tr, td)
     assert tr is not None
     assert td is not None
     result = answers.verify_run(question.reference, tr, td, question.settings)
@@ -352,7 +355,12 @@ def judge_pair(
         from d2rpick.choice.switched.compared_verdict import add_comparison
 
         result = add_comparison(
-            result, question.reference, switched_reference, min_mean_energy
+            result,
+            question.reference,
+            switched_reference,
+            windows,
+            min_mean_energy,
+            tr_is_read=tr_is_read,
         )
         times += [text for name in switched.sources for text in ("--switched", name)]
         times += ["--min-mean-energy", repr(min_mean_energy)] * (

@@ -34,11 +34,13 @@ class Limit(NamedTuple):
     """A limit that a recommended pair must meet. An unknown value does not meet it.
 
     ``quantity`` is a column of judged candidates, or an attribute of the situation at td.  If ``is_lower`` is True, the
-    value must not be below the limit, otherwise not above it.
+    value must not be below the limit, otherwise not above it.  If ``is_of_vibration`` is True, a flight in which
+    nothing vibrates meets the limit.
     """
 
     quantity: str
     is_lower: bool = False
+    is_of_vibration: bool = False
 
     def is_kept_by(self, values: Any, limit: float) -> Any:
         """Return True for each of the ``values`` that meets the limit; an unknown value (NaN) does not meet it.
@@ -74,7 +76,7 @@ class Limit(NamedTuple):
 class Use(NamedTuple):
     """Commands and answers that use an option of a choice, and the limit that the option sets.
 
-    ``limit`` is the quantity that the value of the option limits; None if the option is not a limit. If ``of_cards`` is
+    ``limit`` is the `Limit` that the value of the option sets; None if the option is not a limit. If ``of_cards`` is
     True, ``card`` and ``check --history`` also have the option, and if ``of_sets`` is True, ``parts`` and ``study``
     also have it. If ``is_advanced`` is True, the last section of the help lists the option.
     """
@@ -95,8 +97,8 @@ def _describe_use(**use: Any) -> dict[str, Use]:
 class ChoiceOptions:
     """The options that define how a pair is chosen and judged; times have the unit of the history.
 
-    An option that limits recommendations has a ``limit``. Suggest, verify, explore, plan, study and check then refuse
-    each pair that exceeds the limit, state this, and exclude such pairs from the windows.
+    An option that limits recommendations has a ``limit``. Suggest, verify, explore, plan, study, check and card
+    then refuse each pair that exceeds the limit, state this, and exclude such pairs from the windows.
     """
 
     after: float | None = make_option(
@@ -130,13 +132,17 @@ class ChoiceOptions:
         "Reject a td with a larger kinetic fraction.",
         NOT_NEGATIVE,
         "K",
-        metadata=_describe_use(limit=Limit("kinetic_share"), of_cards=True),
+        metadata=_describe_use(
+            limit=Limit("kinetic_share", is_of_vibration=True), of_cards=True
+        ),
     )
     max_residual: float | None = make_option(
         "Reject a pair with a larger residual.",
         NOT_NEGATIVE,
         "R",
-        metadata=_describe_use(limit=Limit("residual"), of_cards=True),
+        metadata=_describe_use(
+            limit=Limit("residual", is_of_vibration=True), of_cards=True
+        ),
     )
     fit_window: tuple[float, float] | None = make_option(
         "Time range to which the oscillator is fitted.",

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Final, Protocol, cast
 import numpy as np
 
 from d2rpick.base.errors import FormatError, list_names
-from d2rpick.histories import force_listings
 from d2rpick.histories.content import Scattered
 from d2rpick.histories.database import Database, Legs
 from d2rpick.histories.formats import FAMILIES, READERS
@@ -51,6 +50,8 @@ _DEFAULT = Selection()
 _LONGEST_LEGEND: Final = 1 << 24
 # Largest number of unused tables that a note names.
 _MOST_TABLES: Final = 3
+# Each force listing contains one of these words, in upper or lower case.
+_WORDS_OF_FORCES: Final = (b"slave", b"master", b"surf", b"wall#")
 # Words that LS-DYNA prints above the states in a nodout.
 _NODOUT: Final = b"n o d a l   p r i n t   o u t"
 # Characters at the end of the name of a later file in a family.
@@ -148,6 +149,8 @@ def open_sources(
 
     ``notes_on_names`` contains notes about the names by which the files were found.
     """
+    sources, notes_on_copies = _leave_out_copies(sources)
+    notes_on_names = (*notes_on_names, *notes_on_copies)
     with_forces: list[Source] = []
     with_nodes: list[Source] = []
     if input_format == "auto":
@@ -159,6 +162,7 @@ def open_sources(
         _refuse_only_listings(with_forces, with_nodes)
     kinds, left_out = _sort_by_format(sources, input_format)
     ordered = [kind for kind in READERS if kind in kinds]
+    _refuse_several_solvers(kinds)
     _refuse_time_of_solver(ordered, selection.time)
     opened, notes = _open_legs_of_formats(kinds, ordered, selection)
     ordered = [kind for kind in ordered if kind in opened]
@@ -198,6 +202,49 @@ def open_sources(
         nodes=tuple(with_nodes),
         reopen=reopen,
     )
+
+
+def _leave_out_copies(
+    sources: Sequence[Source],
+) -> tuple[list[Source], tuple[str, ...]]:
+    """Return the files without those that have the content of an earlier one, and a note on each that is left out."""
+    kept = list[Source]()
+    notes = list[str]()
+    for source in sources:
+        original = next((other for other in kept if _is_copy(source, other)), None)
+        if original:
+            notes.append(
+                f"{source.name} has the same content as {original.name} and was left out"
+            )
+        else:
+            kept.append(source)
+    return kept, tuple(notes)
+
+
+def _is_copy(source: Source, other: Source) -> bool:
+    """Return True if two files have the same content, packed or not; the files of a family are never copies."""
+    content, other_content = source.data, other.data
+    if isinstance(content, Scattered) or isinstance(other_content, Scattered):
+        return False
+    if len(content) != len(other_content) or content[:_HEAD] != other_content[:_HEAD]:
+        return False
+    return content[:] == other_content[:]
+
+
+def _refuse_several_solvers(kinds: Mapping[str, Sequence[Source]]) -> None:
+    """Raise FormatError if the files of a run were written by different solvers."""
+    files = {
+        READERS[kind].solver: sources[0].name
+        for kind, sources in kinds.items()
+        if READERS[kind].solver
+    }
+    if len(files) > 1:
+        listed = " and ".join(
+            f"{name} by {solver}" for solver, name in sorted(files.items())
+        )
+        raise FormatError(
+            f"{listed} were written by different solvers, files of one run were expected; give the files of one run"
+        )
 
 
 def _refuse_only_listings(
@@ -301,9 +348,16 @@ def _sort_forces_last(
 
 def _is_force_listing(source: Source) -> bool:
     """Return True if a file is a force listing, which is never part of a family."""
-    return not isinstance(source.data, Scattered) and force_listings.recognises(
-        source.data[:_HEAD]
-    )
+    if isinstance(source.data, Scattered):
+        return False
+    head = source.data[:_HEAD]
+    in_lower_case = head.lower()
+    if not any(word in in_lower_case for word in _WORDS_OF_FORCES):
+        return False
+    # Imported here to keep start-up fast.
+    from d2rpick.histories.force_listings import recognises
+
+    return recognises(head)
 
 
 def _is_node_listing(source: Source) -> bool:
@@ -320,8 +374,13 @@ def _read_force_listings(
     sources: Sequence[Source],
 ) -> tuple[tuple[ContactForce, ...], tuple[str, ...]]:
     """Read the forces in files without energies; if the forces cannot be read, return a note."""
+    if not sources:
+        return (), ()
+    # Imported here to keep start-up fast.
+    from d2rpick.histories.force_listings import read_listed_forces
+
     try:
-        return force_listings.read_listed_forces(sources), ()
+        return read_listed_forces(sources), ()
     except FormatError as error:
         return (), (f"{error}; it was not used",)
 
@@ -446,18 +505,12 @@ def check_legs(legs: Sequence[Database]) -> None:
     """Raise FormatError if files of one format belong to different runs.
 
     All restart segments of a run have the same quantities, and a restart repeats the state with which it begins. Files
-    that begin at the same time are either copies or files of different runs, so all their states at common times are
-    compared.
+    that begin at the same time are files of different runs unless one is an earlier copy of the other, so all their
+    states are compared.
     """
     for first, second in combinations(legs, 2):
-        held_by_first = _list_columns_and_parts(first)
-        held_by_second = _list_columns_and_parts(second)
-        both_hold = held_by_first and held_by_second
-        if both_hold and held_by_first.isdisjoint(held_by_second):
-            raise FormatError(
-                f"{first.source} and {second.source} have neither a column nor a part in common, "
-                "restart segments of one run were expected; give the files of one run"
-            )
+        _check_content(first, second)
+        _check_starts(first, second)
         for times, columns in (
             (_list_model_times, _read_model_energies),
             (_list_part_times, _read_part_energies),
@@ -472,15 +525,45 @@ def check_legs(legs: Sequence[Database]) -> None:
             except FormatError:  # The error is reported later, when the column is read.
                 continue
             if not are_alike:
-                raise FormatError(
-                    f"{first.source} and {second.source} have different energies at the same times, "
-                    "restart segments of one run were expected; give the files of one run"
+                raise _expect_legs(
+                    first, second, "have different energies at the same times"
                 )
 
 
-def _list_columns_and_parts(leg: Database) -> set[str | int]:
-    """Return the columns and part ids of a restart segment."""
-    return {*leg.channels, *(part.id for part in leg.parts)}
+def _check_content(first: Database, second: Database) -> None:
+    """Raise FormatError if two files have no part in common, or neither a column nor a part."""
+    parts = [{part.id for part in leg.parts} for leg in (first, second)]
+    columns = [{*leg.channels} for leg in (first, second)]
+    if all(parts) and parts[0].isdisjoint(parts[1]):
+        raise _expect_legs(first, second, "have no part in common")
+    contents = [
+        {*map(str, ids), *names} for ids, names in zip(parts, columns, strict=True)
+    ]
+    if all(contents) and contents[0].isdisjoint(contents[1]):
+        raise _expect_legs(first, second, "have neither a column nor a part in common")
+
+
+def _check_starts(first: Database, second: Database) -> None:
+    """Raise FormatError if two files begin at the same time, but have different times up to the end of the shorter."""
+    for list_times in (_list_model_times, _list_part_times):
+        try:
+            times = [np.unique(list_times(leg)) for leg in (first, second)]
+        except FormatError:  # The error is reported later, when the times are read.
+            continue
+        if not all(values.size for values in times) or times[0][0] != times[1][0]:
+            continue
+        end = min(values[-1] for values in times)
+        if not np.array_equal(*(values[values <= end] for values in times)):
+            problem = f"both begin at {times[0][0]:g}, but have different times"
+            raise _expect_legs(first, second, problem)
+
+
+def _expect_legs(first: Database, second: Database, problem: str) -> FormatError:
+    """Return the error for two files that are not restart segments of one run."""
+    return FormatError(
+        f"{first.source} and {second.source} {problem}, restart segments of one run were expected; "
+        "give the files of one run"
+    )
 
 
 def _list_model_times(leg: Database) -> Samples:

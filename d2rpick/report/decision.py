@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from d2rpick.base.errors import make_printable
 from d2rpick.choice.pair.decision import join_cures
 from d2rpick.choice.pair.grades import DO_NOT_USE, GOOD
 from d2rpick.choice.pair.quality import MOST_WORTH_OF_FAIR
@@ -131,7 +132,8 @@ def format_outlook(decision: Decision) -> str:
 def format_rigid_time(best: Candidate, history: History) -> str:
     """Format the time for which the parts are rigid."""
     share = format_rigid_share(best.rigid_fraction, history)
-    return f"{best.rigid_time:.6g}, {share}"
+    unit = f" {make_printable(history.time_unit)}" if history.time_unit else ""
+    return f"{best.rigid_time:.6g}{unit}, {share}"
 
 
 def format_rigid_share(fraction: float, history: History) -> str:
@@ -140,16 +142,23 @@ def format_rigid_share(fraction: float, history: History) -> str:
     return f"{fraction:.0%} of {whole}"
 
 
-def format_accuracy(best: Candidate) -> str:
-    """Return the accuracy and the timing tolerance of tr as text; empty if both are unknown."""
-    interval = (
-        "" if best.tr_high is None else f"accurate to ±{best.tr_high - best.tr:.1g}"
-    )
+def format_accuracy(best: Candidate, read_interval: float | None = None) -> str:
+    """Return the accuracy and the timing tolerance of tr as text; empty if both are unknown.
+
+    ``read_interval`` is the output interval that contains a tr that was read from a switched run [time]; None if tr was
+    chosen or given.
+    """
+    if read_interval is not None:
+        accuracy = f"read from the switched run, to within one output interval, {read_interval:.2g}"
+    elif best.tr_high is not None:
+        accuracy = f"accurate to ±{best.tr_high - best.tr:.1g}"
+    else:
+        accuracy = ""
     if best.timing_tolerance is None:
         room = ""
     else:
         room = f"timing tolerance ±{best.timing_tolerance:.1g} (the error grows by at most 0.05)"
-    return "; ".join(filter(None, (interval, room)))
+    return "; ".join(filter(None, (accuracy, room)))
 
 
 def format_saving(best: Candidate) -> str | None:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Final
 
-from d2rpick.base.errors import make_printable
-from d2rpick.choice.pair.grades import DO_NOT_USE
+from d2rpick.base.errors import list_names, make_printable
+from d2rpick.choice.pair.grades import DO_NOT_USE, GOOD
 from d2rpick.choice.pair.warnings import POOR_RESIDUAL
-from d2rpick.choice.switched.comparison import MOST_MOMENTUM_ERROR
+from d2rpick.choice.switched.same_model import MOST_MOMENTUM_ERROR
 from d2rpick.report import keys, tables
 from d2rpick.report.decision import (
     format_accuracy,
@@ -16,9 +17,10 @@ from d2rpick.report.decision import (
     list_statements,
     list_verdict_lines,
 )
-from d2rpick.report.fields import Document, Field, get_kind, maybe, row
+from d2rpick.report.fields import Document, Field, get_kind, many, maybe, row
 from d2rpick.report.next_step import (
     add_step_to_copy,
+    name_step_after_flight,
     name_step_after_refusal,
     name_step_with_pair,
     write_command,
@@ -26,10 +28,11 @@ from d2rpick.report.next_step import (
 from d2rpick.report.situation import list_situation_heading
 
 if TYPE_CHECKING:
+    from d2rpick.base.spans import Times
     from d2rpick.choice.answers import PairVerdict
     from d2rpick.choice.pair.decision import Decision
     from d2rpick.choice.switched.comparison import Comparison
-    from d2rpick.report.formats import DisplayOptions
+    from d2rpick.report.formats import DisplayOptions, RepeatedQuestion
 
 # Fields of the judged pair, of its measured values, and of the verdict on it.
 MEASURES: Final = row(
@@ -48,16 +51,17 @@ MEASURES: Final = row(
         "true if the pair is admissible, not poor, and has a residual of at most 0.5; see verdict",
     ),
 )
+_IF_WRONG: Final = "null if the solver reports wrong energies of all compared parts"
 SWITCHED: Final = row(
     Field("source", get_kind("texts", minItems=1), "files of the switched run"),
-    Field("energy_frozen", "number", "energy of the switched run at td"),
+    Field("energy_frozen", "number?", f"energy of the switched run at td; {_IF_WRONG}"),
     Field("energy_td", "number", "energy of the reference run at td"),
-    Field("level_ratio", "number?", "energy_frozen divided by energy_td"),
+    Field("level_ratio", "number?", "energy_frozen divided by energy_td; null if energy_td is only "
+                                      "round-off or energy_frozen is null"),
     Field("end", "number", "end of the comparison, which begins at td"),
-    Field("mean_after", "number", "mean energy after td in the switched run"),
+    Field("mean_after", "number?", f"mean energy after td in the switched run; {_IF_WRONG}"),
     Field("mean_after_reference", "number", "mean energy after td in the reference run"),
-    Field("spread_after", get_kind("number", minimum=0), "standard deviation of the energy after td in the switched "
-                                                         "run"),
+    Field("spread_after", "size?", f"standard deviation of the energy after td in the switched run; {_IF_WRONG}"),
     Field("spread_after_reference", get_kind("number", minimum=0), "standard deviation of the energy after td in the "
                                                                    "reference run"),
     Field("momentum_error", "size?",
@@ -68,7 +72,9 @@ SWITCHED: Final = row(
     Field("rigid_to", "number?", "last time at which this energy is constant"),
     Field("objections", "texts", "reasons why the comparison failed; empty if it passed"),
     Field("notes", "texts", "what was left out or assumed when the switched run was read, and anomalies of this run"),
-    name="switched", later=("rigid_from", "rigid_to", "objections"),
+    Field("other_windows", many("span"), "other windows (tr, td) in which the "
+          "switched run was rigid; they were not compared"),
+    name="switched", later=("rigid_from", "rigid_to", "objections", "other_windows"),
 )  # fmt: skip
 DOCUMENT: Final = Document("d2rpick/verify/2", "Answer of d2rpick verify; times in the unit of the history.", row(
     *keys.FRAME,
@@ -80,6 +86,11 @@ DOCUMENT: Final = Document("d2rpick/verify/2", "Answer of d2rpick verify; times 
     Field("switched", maybe(SWITCHED), "comparison of a finished switched run with the reference run; null without "
                                        "--switched"),
 ))  # fmt: skip
+# Step after a comparison within the limits of a pair that cannot be used.
+_USE_MOTION_OF_SWITCHED_RUN: Final = (
+    "use at most the motion of this switched run, because nothing shows that its vibration after td is right; "
+    "`min_quality` poor accepts it"
+)
 COMPARED = ("", "switched", "reference")
 
 
@@ -121,14 +132,19 @@ def list_next_step(
     decision = answer.decision
     situation = answer.situation
     if decision.verdict == DO_NOT_USE:
-        line = write_command(question, "explore", "--td", f"{answer.td:.6g}")
+        if answer.switched and not answer.switched.objections:
+            otherwise = _USE_MOTION_OF_SWITCHED_RUN
+        elif decision.best_of or situation.flight.start is None:
+            otherwise = name_step_after_flight(situation, decision, question)
+        else:
+            line = write_command(question, "explore", "--td", f"{answer.td:.6g}")
+            otherwise = f"compare other td with {line}"
         step = name_step_after_refusal(
-            situation,
-            decision.better,
-            question,
-            f"compare other td with {line}",
-            decision,
+            situation, decision.better, question, otherwise, decision
         )
+    elif later := _find_next_window(answer):
+        line = _write_command_for_window(question, later)
+        step = f"{_name_usable_results(answer)} up to {later[0]:.6g}; judge the next window with {line}"
     elif answer.switched and display.page:
         step = f"{_name_usable_results(answer)}; {display.page} contains the comparison"
     elif answer.switched:
@@ -141,15 +157,33 @@ def list_next_step(
     return add_step_to_copy(situation.history, [("next", step)])
 
 
+def _find_next_window(answer: PairVerdict) -> Times | None:
+    """Return the window of the switched run (tr, td) after the judged one [time]; None if there is none."""
+    others = answer.switched.other_windows if answer.switched else ()
+    return next((window for window in others if window[0] >= answer.td), None)
+
+
+def _write_command_for_window(question: RepeatedQuestion, window: Times) -> str:
+    """Return the command that compares the switched run in another of its windows."""
+    words = question.times
+    kept = [
+        word
+        for before, word in pairwise(("", *words))
+        if not {before, word} & {"--tr", "--td"}
+    ]
+    tr, td = (f"{time:.6g}" for time in window)
+    return write_command(question, "verify", "--tr", tr, "--td", td, *kept)
+
+
 def _name_usable_results(answer: PairVerdict) -> str:
-    """Return the advice to use the switched run, restricted to the motion if its vibration is known to be wrong."""
+    """Return the advice to use the switched run, or only its motion if its vibration is known to be wrong."""
     decision = answer.decision
     switched = answer.switched
     is_kept = switched is None or _keeps_vibration(switched, decision)
-    usable = "the results"
     if decision.allows_only_motion or not is_kept:
-        usable = "only the motion"
-    return f"use {usable} of the switched run"
+        return "use only the motion of the switched run"
+    care = "" if decision.grade == GOOD else " with care"
+    return f"use the results of the switched run{care}"
 
 
 def place_comparison(
@@ -172,13 +206,41 @@ def list_comparison(answer: PairVerdict) -> list[tuple[str, str]]:
     if switched is None:
         return []
     compared = ", ".join(_list_limited_values(switched))
-    if _contradicts_verdict(switched, answer.decision):
-        return [("comparison", _describe_partial_comparison(switched, compared))]
-    verdict = "failed" if switched.objections else "passed"
-    text = ": ".join(filter(None, (verdict, compared)))
-    if not _keeps_vibration(switched, answer.decision):
-        text += f"; {_describe_spread(switched)}"
-    return [("comparison", text)]
+    is_within = _contradicts_verdict(switched, answer.decision)
+    if is_within:
+        verdict = "within limits"
+    elif switched.objections:
+        verdict = "failed"
+    else:
+        verdict = "passed" if compared else "not possible"
+    remark = _describe_missing_energy(switched, answer.decision)
+    if is_within and not remark:
+        remark = f"this does not show that the vibration is kept: {_describe_spread(switched)}"
+    elif not _keeps_vibration(switched, answer.decision):
+        remark = remark or _describe_spread(switched)
+    heading = f"{verdict}{_number_window(answer)}"
+    compared = compared or "nothing with a limit is known"
+    return [("comparison", "; ".join(filter(None, (f"{heading}: {compared}", remark))))]
+
+
+def _number_window(answer: PairVerdict) -> str:
+    """Return which window of the switched run is compared, if it has several; otherwise an empty text."""
+    others = answer.switched.other_windows if answer.switched else ()
+    if not others:
+        return ""
+    number = 1 + sum(tr < answer.candidate.tr for tr, _ in others)
+    return f" in window {number} of {len(others) + 1}"
+
+
+def _describe_missing_energy(switched: Comparison, decision: Decision) -> str:
+    """Return why only the motion is compared; empty if the energies are compared."""
+    if switched.mean_after is None:
+        parts = list_names(switched.misreported)
+        cause = "a fault of some solvers for solids that were rigid"
+        return f"only the motion is compared, because the energies of {parts} are wrong after td, {cause}"
+    if not switched.has_energy and decision.at_rest:
+        return "only the motion is compared, because nothing vibrates"
+    return ""
 
 
 def _contradicts_verdict(switched: Comparison, decision: Decision) -> bool:
@@ -189,7 +251,7 @@ def _contradicts_verdict(switched: Comparison, decision: Decision) -> bool:
 def _list_limited_values(switched: Comparison) -> list[str]:
     """Return the compared values that have limits, each with its limits."""
     compared = []
-    if switched.mean_after_reference > 0:
+    if switched.has_energy and switched.mean_after is not None:
         ratio = switched.mean_after / switched.mean_after_reference
         limits = f"{100 * switched.min_mean:g}% to {100 * (2 - switched.min_mean):g}%"
         compared.append(
@@ -203,21 +265,16 @@ def _list_limited_values(switched: Comparison) -> list[str]:
     return compared
 
 
-def _describe_partial_comparison(switched: Comparison, compared: str) -> str:
-    """Return the row of a comparison that exceeds no limit although the pair is not to be used."""
-    within = f"within limits: {compared or 'nothing with a limit is known'}"
-    meaning = "this does not show that the vibration is kept"
-    return f"{within}; {meaning}: {_describe_spread(switched)}"
-
-
 def _keeps_vibration(switched: Comparison, decision: Decision) -> bool:
-    """Return False if the amplitude after td seems to be wrong by more than the largest usable residual.
+    """Return False if the amplitude after td is unknown or seems wrong by more than the largest usable residual.
 
     The energy varies with the square of the amplitude, and by less if the parts vibrate about a deformed shape.
     """
     if decision.at_rest:
         return True
     spread = switched.spread_after
+    if spread is None:
+        return False
     reference = switched.spread_after_reference
     smallest = (1 - POOR_RESIDUAL) ** 2 * reference
     largest = (1 + POOR_RESIDUAL) ** 2 * reference
@@ -226,6 +283,8 @@ def _keeps_vibration(switched: Comparison, decision: Decision) -> bool:
 
 def _describe_spread(switched: Comparison) -> str:
     """Return the standard deviation of the energy after td in the switched run, relative to the reference run."""
+    if switched.spread_after is None:
+        return ""
     spread = f"standard deviation of the energy after td {switched.spread_after:.3g}"
     return f"{spread}, in the reference run {switched.spread_after_reference:.3g}"
 
@@ -239,7 +298,7 @@ def list_pair_evidence(answer: PairVerdict) -> list[tuple[str, str]]:
     ]
     if best.run_time_share is not None:
         lines.append(("saves", format_saved_share(best.run_time_share)))
-    if exact := format_accuracy(best):
+    if exact := format_accuracy(best, answer.tr_interval):
         lines.append(("tr", exact))
     return lines
 
@@ -305,14 +364,14 @@ def list_all_measures(answer: PairVerdict) -> dict[str, Any]:
 
 
 def as_csv(answer: PairVerdict, _: DisplayOptions) -> str:
-    """Return one row of CSV with a column for each key that `measures` returns."""
+    """Return one row of CSV with a column for each key that `list_all_measures` returns."""
     values = list_all_measures(answer)
     return tables.as_csv(list(values), [list(values.values())]).rstrip("\n")
 
 
 def compare_values(switched: Comparison) -> list[tuple[str, float, float]]:
-    """Return the numbers known for both runs as rows of name, reference run and switched run (see `COMPARED`)."""
-    return [
+    """Return the numbers known for both runs as rows of name, switched run and reference run (see `COMPARED`)."""
+    rows = [
         ("energy right after td", switched.energy_frozen, switched.energy_td),
         ("mean energy after td", switched.mean_after, switched.mean_after_reference),
         (
@@ -321,28 +380,34 @@ def compare_values(switched: Comparison) -> list[tuple[str, float, float]]:
             switched.spread_after_reference,
         ),
     ]
+    return [
+        (name, value, reference) for name, value, reference in rows if value is not None
+    ]
 
 
 def list_deviations(switched: Comparison) -> list[tuple[str, str]]:
-    """Return how far the switched run deviates from the reference run after td, as (name, text) pairs."""
+    """Return how far the switched run deviates after td, and its other rigid windows, as (name, text) pairs."""
     error = switched.momentum_error
     displacement = switched.displacement
-    if error is None:
-        rows = []
-    else:
-        rows = [
+    rows = []
+    if error is not None:
+        rows.append(
             ("largest error of the momentum after td", f"{error:.2g} of its maximum")
-        ]
-    if displacement is None:
-        return rows
-    return [*rows, ("largest displacement after td", f"{displacement:.3g}")]
+        )
+    if displacement is not None:
+        rows.append(("largest displacement after td", f"{displacement:.3g}"))
+    if switched.other_windows:
+        others = [f"{tr:.6g} to {td:.6g}" for tr, td in switched.other_windows]
+        rows.append(("rigid too, but not compared here", list_names(others)))
+    return rows
 
 
 def _format_comparison(switched: Comparison) -> list[str]:
     """Return the lines that compare the switched run with the reference run."""
+    values = compare_values(switched)
     return [
         f"switched run  {make_printable(', '.join(switched.source))}; compared from td to {switched.end:.6g}",
-        tables.as_text(COMPARED, compare_values(switched)),
+        *([tables.as_text(COMPARED, values)] if values else []),
         *(f"{name.ljust(38)}  {text}" for name, text in list_deviations(switched)),
         *(f"note: {make_printable(note)}" for note in switched.notes),
     ]
@@ -358,5 +423,5 @@ def _list_switched_measures(answer: PairVerdict) -> dict[str, Any]:
     return {
         f"switched_{name}": value
         for name, value in values.items()
-        if name not in ("source", "notes")
+        if name not in ("source", "notes", "other_windows")
     }

@@ -27,7 +27,7 @@ _LOOSE_TURNS: Final = 0.5
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LineScatter:
-    """Standard deviation of the squared residual for one interpretation ``reading`` of the lines on a ``grid``.
+    """Standard deviation of the squared residual if the lines on a ``grid`` are assigned to modes as in ``reading``.
 
     ``systematic`` is the fraction of the misfit that neighbouring states have in common [-].
     """

@@ -30,7 +30,7 @@ _ORDERS: Final = (3, 5, 7, 9, 11, 13, 17, 21, 27, 35, 45, 57, 71)
 # _CLEARLY_BETTER: more exponentials are preferred if they reduce the prediction error to this fraction or less [-].
 # PERFECT: relative prediction error below which no more exponentials are tried [-].
 _CLEARLY_BETTER, PERFECT = 0.8, 2e-4
-# _BETTER: fraction that replaces _CLEARLY_BETTER if the misfit still contains a spectral line [-].
+# _BETTER: replaces _CLEARLY_BETTER if the misfit with fewer exponentials still contains a spectral line [-].
 # _OF_A_LINE: a misfit contains a spectral line if its largest power is at least this multiple of the mean power [-].
 _BETTER, _OF_A_LINE = 0.97, 16.0
 # Fraction of the record that is fitted to predict the rest of the record [-].
@@ -90,6 +90,11 @@ class Grid(NamedTuple):
     def span(self) -> float:
         """Return the time from the first block to the last block [time]."""
         return float(self.time[-1] - self.time[0])
+
+    @property
+    def first_part(self) -> Grid:
+        """Return the first part of the grid, which is fitted to predict the rest."""
+        return self.some(slice(int(FIRST_PART * self.time.size)))
 
     def some(self, blocks: slice) -> Grid:
         """Return a grid with some successive blocks."""
@@ -360,9 +365,8 @@ def _find_best_order(grid: Grid, swing: float) -> _Trial | None:
     """Find the number of exponentials with which the first part of a grid predicts the rest best; None as `predict`."""
     if grid.time.size < _FEWEST_STATES // 2 or not swing > 0:
         return None
-    size_of_first = int(FIRST_PART * grid.time.size)
-    first = grid.some(slice(size_of_first))
-    rest = grid.some(slice(size_of_first, None))
+    first = grid.first_part
+    rest = grid.some(slice(first.time.size, None))
     space = _SignalSpace.of(first)
     tried: list[_Trial] = []
     for order in _ORDERS:

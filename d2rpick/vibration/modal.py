@@ -144,6 +144,8 @@ class ModalVibration:
         Number of states per period of the highest-frequency line that exceeds the noise [-].
     scatter : LineScatter
         Standard deviation of the squared residual due to the scatter of the record about its lines.
+    scatter_of_first_part : LineScatter
+        The same for the lines in the first part of the record.
     with_close_modes : Reading or None
         Interpretation in which two close modes replace one line, and no energy is static; None if not possible.
     swinging : float
@@ -168,6 +170,7 @@ class ModalVibration:
     systematic: float
     states_per_period: float
     scatter: LineScatter
+    scatter_of_first_part: LineScatter
     with_close_modes: Reading | None = None
     swinging: float = 0.0
     bent: float = 0.0
@@ -240,15 +243,15 @@ class ModalVibration:
         )
 
     def elastic_energy(self, t: Samples | float) -> Samples:
-        """Return V, at least 0, in the shape of ``t`` [energy]."""
+        """Return the elastic energy V of the vibration, at least 0, in the shape of ``t`` [energy]."""
         return np.maximum(self.reading.elastic_energy(t), 0.0)
 
     def vibration_energy(self, t: Samples | float) -> Samples:
-        """Return U = V + T, in the shape of ``t`` [energy]."""
+        """Return the vibration energy U = V + T (elastic plus kinetic), in the shape of ``t`` [energy]."""
         return self.reading.vibration_energy(t)
 
     def kinetic_energy(self, t: Samples | float) -> Samples:
-        """Return T, at least 0, in the shape of ``t`` [energy]."""
+        """Return the kinetic energy T of the vibration, at least 0, in the shape of ``t`` [energy]."""
         return np.maximum(self.vibration_energy(t) - self.elastic_energy(t), 0.0)
 
     def overlap(self, tr: Samples | float, td: Samples | float) -> Samples:
@@ -287,7 +290,10 @@ class ModalVibration:
 
     @cached_property
     def _at_all_times(self) -> tuple[Samples, _Course, Complex]:
-        """Return elastic energies at ``time`` and at finer times, and the part of the coherence that depends on tr."""
+        """Return V at ``time`` and on a finer time grid, and the factor of tr in the coherence C, for `profile`.
+
+        C is the coherence of the lines between tr and td, the product of a factor of tr and a factor of td.
+        """
         finer = np.linspace(
             self.time[0], self.time[-1], _FINER * (self.time.size - 1) + 1
         )
@@ -314,13 +320,13 @@ class ModalVibration:
         reading, level = self.reading, self.reading.level(td)
         pairs = reading.compare(tr, td)
         squared = reading.square_residual(pairs, td)
-        of_first_part = self.of_first_part.coherence(tr, td)
-        lines = np.abs(pairs.coherence - of_first_part) / level
         scatter = self.scatter.compute_deviation(tr, td, squared)
         deviation = measures.BAND_DEVIATIONS * scatter
+        change = (pairs.coherence - self.of_first_part.coherence(tr, td)) / level
         # The accuracy of the lines follows from the fit and from a second fit to the first part of the record.
         of_lines = np.minimum(
-            np.maximum(deviation, lines), np.maximum(squared, _MOST_OPPOSED)
+            np.maximum(deviation, self._exceed_noise(np.abs(change), tr, td)),
+            np.maximum(squared, _MOST_OPPOSED),
         )
         of_rest = _REST_COUNTS * self.noise / level * np.sqrt(self._structure_of_rest)
         of_structure = _compute_effect_of_deformation(_NOT_LINEAR, squared)
@@ -345,6 +351,16 @@ class ModalVibration:
             below + np.maximum(-shift - room, 0.0),
             above + np.maximum(shift - room, 0.0),
         )
+
+    def _exceed_noise(
+        self, change: Samples, tr: Samples | float, td: Samples | float
+    ) -> Samples:
+        """Return by how much a ``change`` due to the lines of the first part exceeds what noise explains [-]."""
+        if self._structure_of_rest > 0:
+            return change
+        first = self.of_first_part.residual_squared(tr, td)
+        scatter = self.scatter_of_first_part.compute_deviation(tr, td, first)
+        return np.maximum(change - measures.BAND_DEVIATIONS * scatter, 0.0)
 
     @property
     def _structure_of_rest(self) -> float:
@@ -634,11 +650,12 @@ def _read(
         doubts = doubts._replace(drift=0.0)
     if kinetic:
         doubts = doubts._replace(negative=0.0, drift=0.0, unstretched=0.0)
+    of_first_part = _read_first_part(reading, prediction, grid, stretches, scatter)
     return ModalVibration(
         time=_close_times(reading, window, grid.time.size),
         reading=reading,
         others=interpretation.others,
-        of_first_part=_read_first_part(reading, prediction, grid, stretches, scatter),
+        of_first_part=of_first_part,
         with_close_modes=None
         if close_modes is None
         else _read_close_modes(reading, close_modes),
@@ -649,6 +666,7 @@ def _read(
             grid.strong, _count_states(spectrum.lines, grid, scatter)
         ),
         scatter=LineScatter(reading, grid, systematic),
+        scatter_of_first_part=LineScatter(of_first_part, grid.first_part, systematic),
         swinging=sum(stretch.energy for stretch in stretches if stretch.swings),
         bent=max((third.second for third in springs), default=0.0),
         source="kinetic energy" if kinetic else "internal energy",

@@ -11,21 +11,25 @@ import numpy as np
 import pytest
 
 from d2rpick.base.errors import RangeError
+from d2rpick.base.spans import Times
 from d2rpick.choice.answers import PairVerdict, verify_run
-from d2rpick.choice.question import Settings
+from d2rpick.choice.question import Reference, Settings
 from d2rpick.choice.switched.compared_verdict import add_comparison
 from d2rpick.choice.switched.comparison import (
-    MOST_MOMENTUM_ERROR,
     Comparison,
     compare_runs,
-    find_switch_times,
+)
+from d2rpick.choice.switched.same_model import MOST_MOMENTUM_ERROR
+from d2rpick.choice.switched.switch_times import (
+    find_switched_windows,
+    read_switch_times,
 )
 from d2rpick.choice.switched.switched_run import (
     detect_rigid_parts,
     prepare_switched_history,
 )
 from d2rpick.histories.history import History, Samples, Track
-from d2rpick.histories.opening import Selection, open_run
+from d2rpick.histories.opening import OpenedRun, Selection, open_run
 from tests.command import (
     BOX,
     ENERGY,
@@ -162,16 +166,23 @@ def test_the_times_are_read_off_the_switched_run() -> None:
     )
 
 
+def read_times(switched: History, reference: History) -> Times:
+    """Return tr and td of a switched run of which only the energy is known."""
+    read = Reference(OpenedRun((), ()), switched)
+    windows = find_switched_windows(read, reference)
+    return read_switch_times(read, reference, windows, None, None)
+
+
 def test_a_run_without_rigid_times_is_refused_with_the_cause() -> None:
     swinging = make_history(2.0 + np.sin(40 * TIME) ** 2)
     other = make_history(2.0 + np.sin(41 * TIME) ** 2)
     constant = make_history(np.full_like(TIME, 2.0))
     with pytest.raises(RangeError, match="never stays constant"):
-        find_switch_times(other, swinging)
+        read_times(other, swinging)
     with pytest.raises(RangeError, match="from 0 to 1, but that of the reference run"):
-        find_switch_times(constant, make_history(np.full_like(TIME, 3.0)))
+        read_times(constant, make_history(np.full_like(TIME, 3.0)))
     with pytest.raises(RangeError, match="the same energies"):
-        find_switch_times(swinging, make_history(swinging.energy))
+        read_times(swinging, make_history(swinging.energy))
 
 
 def test_round_off_in_a_fall_counts_as_constant() -> None:
@@ -180,7 +191,7 @@ def test_round_off_in_a_fall_counts_as_constant() -> None:
     noise = 1e-12 * np.random.default_rng(1).random((2, TIME.size))
     falling, rigid = (make_history(landed + values) for values in noise)
     with pytest.raises(RangeError, match=r"from 0 to 0\.7, but that of the reference"):
-        find_switch_times(rigid, falling)
+        read_times(rigid, falling)
 
 
 def test_a_leg_in_which_nothing_stands_still_names_those_beside_it(
@@ -209,7 +220,7 @@ def test_of_a_fall_the_times_are_not_guessed_and_given_ones_verify(
     refusal = run(*arguments).stderr
     assert "the energy stays constant from 0 to" in refusal
     assert (
-        "but that of the reference run does too; give the run with the switching cards, or --tr and --td"
+        "but that of the reference run does too, so it does not show when the parts were rigid; give --tr and --td"
         in refusal
     )
     assert run_json(*arguments, "--tr", "0", "--td", "0.13")["verified"] is True
@@ -711,11 +722,11 @@ def compare_car(run: str, *parts: str) -> PairVerdict:
     """Return the verdict on the car with engine, battery and wheels as six rigid bodies, or as one."""
     solved_run = read_solved("carT01.gz", *parts)
     verdict = verify_run(solved_run, CAR_TR, CAR_TD, Settings())
-    return add_comparison(
-        verdict,
-        solved_run,
-        solved_run.like(open_run(list_legs(run), Selection()), Selection(parts=parts)),
+    switched = solved_run.like(
+        open_run(list_legs(run), Selection()), Selection(parts=parts)
     )
+    windows = find_switched_windows(switched, solved_run.history)
+    return add_comparison(verdict, solved_run, switched, windows)
 
 
 def test_the_parts_that_were_rigid_are_recognised_in_several_bodies() -> None:
@@ -747,7 +758,8 @@ def test_a_run_of_which_all_parts_were_rigid_is_judged_by_its_energy() -> None:
     """Computed: 0.947 of the mean energy of shells and beams until the landing (here all parts without springs)."""
     switched_run = require(compare_car("car_all", "1-17").switched)
     assert switched_run.objections == ()
-    assert switched_run.mean_after / switched_run.mean_after_reference == pytest.approx(
+    mean_after = require(switched_run.mean_after)
+    assert mean_after / switched_run.mean_after_reference == pytest.approx(
         0.957, abs=0.005
     )
 
@@ -763,7 +775,8 @@ def test_parts_that_were_not_rigid_are_named() -> None:
 def test_energies_that_are_reported_wrongly_do_not_enter_the_comparison() -> None:
     """The battery reports 70 400 J instead of 21 J; shells and beams keep 1.019 of their mean energy."""
     switched_run = require(compare_car("car_heavy", "1-17").switched)
-    assert switched_run.mean_after / switched_run.mean_after_reference == pytest.approx(
+    mean_after = require(switched_run.mean_after)
+    assert mean_after / switched_run.mean_after_reference == pytest.approx(
         1.019, abs=0.002
     )
     assert any(
@@ -778,10 +791,11 @@ def test_where_all_energies_are_reported_wrongly_only_the_motion_is_judged(
     parts: tuple[str, ...],
 ) -> None:
     switched_run = require(compare_car("car_heavy", *parts).switched)
-    (objection,) = switched_run.objections
-    assert objection.startswith(
-        "the energies of engine, battery, wheels are wrong after td, so only the motion can be compared"
-    )
+    assert switched_run.misreported == ("engine", "battery", "wheels")
+    assert switched_run.objections == ()
+    assert not switched_run.has_energy
+    wrong = ("energy_frozen", "level_ratio", "mean_after", "spread_after")
+    assert [getattr(switched_run, name) for name in wrong] == [None] * len(wrong)
     assert require(switched_run.momentum_error) < 1e-5
     assert (parts == ()) == (
         "judged by the parts that were rigid: engine, battery, wheels"

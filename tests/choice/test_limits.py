@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 
 import pytest
 from hypothesis import given, settings, strategies as st
@@ -15,7 +16,7 @@ from d2rpick.choice.td.plan import plan_run
 from d2rpick.choice.td.trade_off import explore_run
 from d2rpick.histories.history import Samples
 from d2rpick.rules.judgement import find_faults
-from tests.command import ENERGY
+from tests.command import ENERGY, run
 
 TR, TD = 0.0135867, 0.0687534
 REFERENCE = read_reference([ENERGY])
@@ -87,3 +88,32 @@ def test_a_window_is_cut_where_the_limit_is_reached(least: float) -> None:
             ]
     for tr in windows.ravel().tolist():
         assert verify_in_history(REFERENCE.history, tr, TD, asked).admissible
+
+
+@pytest.mark.parametrize(
+    "asked",
+    [Settings(max_residual=0.0), Settings(max_kinetic_share=0.0)],
+    ids=["residual", "kinetic"],
+)
+def test_a_flight_in_which_nothing_vibrates_meets_every_limit_of_the_vibration(
+    tmp_path: Path, asked: Settings
+) -> None:
+    """Its residual and kinetic fraction are None, not because they are unknown, but because its error is 0."""
+    fall = str(tmp_path / "fall.matsum")
+    run("rollover", "--drop", "0.4", "--tilt", "30", "--dt", "2e-3", "-o", fall)
+    history = read_reference([fall]).history
+    td = 0.2
+    suggestion = suggest_in_history(history, td, asked)
+    assert suggestion.situation.at_rest
+    assert suggestion.chosen
+    assert suggestion.chosen.residual is None
+    assert suggestion.kinetic_share is None
+    verdict = verify_in_history(history, suggestion.chosen.tr, td, asked)
+    assert verdict.admissible
+    assert not verdict.reasons
+    first_flight = plan_run(read_reference([fall]), asked).flights[0]
+    assert first_flight.window
+    assert first_flight.answer
+    assert first_flight.answer.situation.at_rest
+    # A vibrating flight is still refused.
+    assert suggest_in_history(history, 0.75, asked).chosen is None

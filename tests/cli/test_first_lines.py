@@ -8,7 +8,7 @@ import pytest
 
 import d2rpick
 from d2rpick.choice.options import Limit
-from d2rpick.choice.switched.comparison import MOST_MOMENTUM_ERROR
+from d2rpick.choice.switched.same_model import MOST_MOMENTUM_ERROR
 from d2rpick.report.formats import DisplayOptions
 from tests.command import MATSUM, ROOT, put, run, run_json
 
@@ -59,7 +59,10 @@ def test_parts_without_a_deck_are_unknown_and_the_deck_is_the_cure() -> None:
 
 def test_a_run_without_an_energy_balance_has_an_unknown_health() -> None:
     text = join_lines(run("info", MATSUM).stdout)
-    assert text.startswith("record use it to choose times why 1 free flight")
+    assert text.startswith(
+        "record can be used to choose times: it has flights, and d2rpick plan judges their windows "
+        "why 1 free flight"
+    )
     assert "the health of the run is unknown" in text
 
 
@@ -149,6 +152,42 @@ def test_a_switched_run_that_vibrates_differently_is_used_for_the_motion_only(
     assert is_named is (ratio != 1)
 
 
+@pytest.mark.parametrize(("grade", "care"), [("good", ""), ("fair", " with care")])
+def test_the_next_step_does_not_allow_more_than_the_verdict(
+    grade: str, care: str
+) -> None:
+    """A pair to use with care because of its motion is not a pair whose vibration alone is wrong."""
+    reference = d2rpick.read(SAMPLES / "oscillator")
+    computed = d2rpick.read(SAMPLES / "oscillator_switched")
+    answer = d2rpick.verify(reference, switched=computed)
+    quality = answer.decision.quality
+    motion = quality.motion._replace(grade=grade)
+    decision = answer.decision._replace(
+        grade=grade, quality=quality._replace(motion=motion)
+    )
+    vars(answer)["decision"] = decision
+    text = join_lines(answer.text("table", DisplayOptions()))
+    assert f"use{care} tr = " in text
+    assert f"next use the results of the switched run{care}; " in text
+
+
+def test_the_accuracy_of_a_tr_that_is_read_is_that_of_the_switched_run() -> None:
+    """The reference run determines its level far more accurately than the switched run shows when it was switched."""
+    reference = d2rpick.read(SAMPLES / "oscillator")
+    computed = d2rpick.read(SAMPLES / "oscillator_switched")
+    read = d2rpick.verify(reference, switched=computed)
+    text = join_lines(read.text("table", DisplayOptions()))
+    interval = read.tr_interval
+    assert interval == pytest.approx(5.3e-5, rel=0.02)
+    assert (
+        f"tr read from the switched run, to within one output interval, {interval:.2g}; timing tolerance ±"
+        in text
+    )
+    given = d2rpick.verify(reference, read.tr, read.td, switched=computed)
+    assert given.tr_interval is None
+    assert "read from the switched run" not in given.text("table", DisplayOptions())
+
+
 def cut_file(folder: Path, source: Path, size: int) -> str:
     """Write the first ``size`` bytes of a file, and return the path."""
     opened = gzip.open if source.suffix == ".gz" else open
@@ -184,3 +223,19 @@ def test_no_flight_in_a_cut_file_is_a_reason_to_copy_it_again(tmp_path: Path) ->
         assert "--after" not in text
         assert "has to write" not in text
         assert "without switching" not in text
+
+
+@pytest.mark.slow
+def test_a_switched_run_in_which_nothing_vibrated_passes(tmp_path: Path) -> None:
+    """Round-off in the energies of a body that only falls does not show that it deformed while it was rigid."""
+    reference, switched = (str(tmp_path / f"{name}.matsum") for name in "ab")
+    fall = ("rollover", "--drop", "0.2", "--tilt", "25", "--mesh", "4")
+    times = ("--tr", "0", "--td", "0.197104")
+    run(*fall, "-o", reference)
+    run(*fall, *times, "--with-step", "-o", switched)
+    verify = ("verify", "--part", "flying", *times, "--switched", switched, reference)
+    text = join_lines(run(*verify).stdout)
+    assert text.startswith(
+        "comparison passed: momentum error after td 0.00% (limit 5%) use tr = 0, td = 0.197104 "
+    )
+    assert run_json(*verify)["switched"]["level_ratio"] is None

@@ -7,7 +7,7 @@ from typing import Final
 
 import pytest
 
-from tests.command import DECK, ENERGY, GLSTAT, MATSUM, ROOT, run
+from tests.command import BOX, DECK, ENERGY, GLSTAT, MATSUM, ROOT, run
 from tests.examples import read_page
 
 PAGE: Final = "docs/how-to/input-errors.md"
@@ -30,6 +30,7 @@ COMMANDS: Final = {
     "this is a zip archive": ("plan", "archive.zip"),
     "do all files belong to the same run?": ("plan", MATSUM, GLSTAT),
     "restart segments of one run were expected": ("plan", MATSUM, "later.matsum"),
+    "were written by different solvers": ("plan", MATSUM, BOX),
     "main decks (...); name the deck of the run with --deck": ("plan", "decks"),
     "a number was expected; repair or delete the line": ("suggest", "word.csv"),
     "is missing, cut or doubled in the state that begins here": ("plan", "cut.matsum"),

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from tests.command import BOX, GLSTAT, ROOT, read_refusal, run, run_json
+from tests.computed import locate_stored
 
 ENERGY = "sample_data/energy.csv"
 MATSUM = "sample_data/rollover_box.matsum"
@@ -276,7 +277,9 @@ def test_a_dry_run_names_every_program_that_is_unknown(tmp_path: Path) -> None:
 
 def test_a_switched_run_that_ends_rigid_is_not_blamed_on_td() -> None:
     """No td was given, so the cause is that the record ends while the parts are rigid."""
-    answer = read_refusal("verify", "--switched", ENERGY, BOX)
+    legs = [locate_stored(f"rollover_r100_T0{leg}.gz") for leg in (1, 2)]
+    switched = [word for leg in legs for word in ("--switched", leg)]
+    answer = read_refusal("verify", "--part", "box", *switched, BOX)
     assert "while the parts are still rigid" in answer
     assert "give a finished switched run" in answer
 

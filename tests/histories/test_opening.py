@@ -5,7 +5,7 @@ import io
 import lzma
 import re
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +15,9 @@ from d2rpick.base.errors import FormatError
 from d2rpick.histories.formats import READERS
 from d2rpick.histories.opening import Selection, open_run
 from tests.command import put
+from tests.made_t01 import MadePart, make_t01
 from tests.reading import read_history
+from tests.text_files import make_glstat_text
 
 CSV = b"time,internal_energy\n0.0,1.0\n0.1,2.0\n0.2,1.5\n"
 GLSTAT = (
@@ -347,8 +349,71 @@ def test_what_is_named_beside_a_pattern_is_not_left_out(tmp_path: Path) -> None:
 def test_legs_that_start_together_are_ordered_by_name(
     order: tuple[str, str], tmp_path: Path
 ) -> None:
-    rows = "".join(f"{i / 10},{i}\n" for i in range(5))
+    """One file is an earlier copy of the other, written while the run was going on."""
     for name in order:
-        put(tmp_path / name, f"time,internal_energy\n{rows}")
+        write_table(tmp_path / name, [i / 10 for i in range(int(name[-1]) + 4)])
     run = open_run([str(tmp_path / name) for name in order])
     assert run.databases[0].source == f"{tmp_path / 'runT01'}, {tmp_path / 'runT02'}"
+
+
+def write_table(path: Path, times: Sequence[float]) -> str:
+    """Write a table of energies that depend on the time alone, and return its path."""
+    rows = "".join(f"{time},{10 * time}\n" for time in times)
+    return str(put(path, f"time,internal_energy\n{rows}"))
+
+
+@pytest.mark.parametrize("packed", [False, True])
+def test_the_same_file_twice_is_read_once(packed: bool, tmp_path: Path) -> None:
+    original = write_table(tmp_path / "runT01", [0, 1, 2, 3])
+    copy = tmp_path / ("runT01.gz" if packed else "copyT01")
+    content = Path(original).read_bytes()
+    copy.write_bytes(gzip.compress(content) if packed else content)
+    run = open_run([original, str(copy)])
+    assert run.databases[0].source == original
+    note = f"{copy} has the same content as {original} and was left out"
+    assert run.history(Selection()).notes == (note,)
+
+
+@pytest.mark.parametrize("start", [0.0, 5.0])
+def test_runs_that_begin_at_the_same_time_are_not_joined(
+    start: float, tmp_path: Path
+) -> None:
+    """Their energies agree at the start, where nothing is deformed, and they have no other time in common."""
+    first = write_table(tmp_path / "aT01", [start, start + 1, start + 2])
+    second = write_table(tmp_path / "bT01", [start, start + 0.9, start + 1.9])
+    with pytest.raises(
+        FormatError, match=f"both begin at {start:g}, but have different times"
+    ):
+        open_run([first, second])
+
+
+@pytest.mark.parametrize("order", [(0, 1), (1, 0)])
+def test_files_without_a_common_part_are_not_joined(
+    order: tuple[int, int], tmp_path: Path
+) -> None:
+    """A later file would replace the first one, although it belongs to another model."""
+    names = [str(tmp_path / f"{name}T01") for name in "ab"]
+    for name, part, start in zip(names, (1, 2), (0, 2), strict=True):
+        content = make_t01(4, [MadePart(part, "box")], start=start)
+        Path(name).write_bytes(content.data)
+    with pytest.raises(FormatError, match="have no part in common, restart segments"):
+        open_run([names[i] for i in order])
+
+
+def test_a_restart_that_adds_a_part_is_joined(tmp_path: Path) -> None:
+    names = [str(tmp_path / f"runT0{leg}") for leg in (1, 2)]
+    parts = [MadePart(1, "box"), MadePart(2, "step")]
+    for name, count, start in zip(names, (1, 2), (0, 3), strict=True):
+        Path(name).write_bytes(make_t01(3, parts[:count], start=start).data)
+    assert [part.id for part in open_run(names).parts] == [1]
+
+
+def test_files_of_different_solvers_are_not_one_run(tmp_path: Path) -> None:
+    radioss, ls_dyna = str(tmp_path / "runT01"), str(tmp_path / "glstat")
+    Path(radioss).write_bytes(make_t01(8, [MadePart(1, "box")]).data)
+    Path(ls_dyna).write_bytes(make_glstat_text(range(8), range(8)))
+    with pytest.raises(
+        FormatError,
+        match=f"{ls_dyna} by LS-DYNA and {radioss} by Radioss were written by different solvers",
+    ):
+        open_run([radioss, ls_dyna])

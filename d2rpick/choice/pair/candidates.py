@@ -190,8 +190,8 @@ class Judged:
         ]
 
     @cached_property
-    def acceptable(self) -> NDArray[np.bool_]:
-        """True for each candidate without objections, shape (n,)."""
+    def admissible(self) -> NDArray[np.bool_]:
+        """True for each candidate without objections, shape (n,); see `Candidate` for the words."""
         return np.asarray(
             ~np.logical_or.reduce([objection.holds for objection in self.objections])
         )
@@ -199,14 +199,15 @@ class Judged:
     @property
     def recommendable(self) -> NDArray[np.bool_]:
         """True for each candidate that ``suggest`` and ``verify`` accept: it has no objections and exceeds no limit."""
-        return self.acceptable & self.within_limits
+        return self.admissible & self.within_limits
 
     @property
     def within_limits(self) -> NDArray[np.bool_]:
         """True for each candidate that exceeds none of the limits in the settings, shape (n,)."""
         keeps = np.ones(self.situation_of.size, np.bool_)
         for limit, value in self.situations[0].settings.limits:
-            keeps &= limit.is_kept_by(self.get_quantity(limit.quantity), value)
+            is_kept = limit.is_kept_by(self.get_quantity(limit.quantity), value)
+            keeps &= is_kept | (self.at_rest & limit.is_of_vibration)
         return keeps
 
     def get_quantity(self, name: str) -> Samples:
@@ -233,6 +234,13 @@ class Judged:
     def modal(self) -> NDArray[np.bool_]:
         """True for each candidate that is judged with the modal model, shape (n,)."""
         return np.array([situation.basis == "modal" for situation in self.situations])[
+            self.situation_of
+        ]
+
+    @property
+    def at_rest(self) -> NDArray[np.bool_]:
+        """True for each candidate in a flight in which nothing vibrates, shape (n,)."""
+        return np.array([situation.at_rest for situation in self.situations])[
             self.situation_of
         ]
 
@@ -454,7 +462,7 @@ def _find_start_at_rest(situation: Situation) -> Moments | None:
 
 
 def _mark_given_as_matches(situation: Situation, moments: Moments) -> Moments:
-    """Set the kind of each tr that coincides with a closest match to "match", as its accuracy is that of a match."""
+    """Set the kind of a given tr to "match" if it coincides with a closest match, because it is just as accurate."""
     is_given = moments.are("given")
     vibration = situation.vibration
     if situation.at_rest or not (is_given.any() and vibration.profile):
@@ -504,7 +512,7 @@ def _list_remarks(
         yield f"residual up to {measured['residual_high']:.2g} if the record hides a further mode"
     if measured and reach > measured["timing_tolerance"]:
         yield f"tr is known only to ±{reach:.2g}, but its timing tolerance is ±{measured['timing_tolerance']:.2g}"
-    if not measured and reach >= situation.history.step:
+    if not (measured or situation.at_rest) and reach >= situation.history.step:
         yield "the target energy is within the sampling error of an extremum"
 
 

@@ -682,8 +682,8 @@ def _describe_keeps_nothing(situation: Situation, residual: float) -> str:
     smallest = situation.vibration.least_residual or 0.0
     better = f"{NOTHING_KEPT:g}, the residual of a release without any vibration"
     if situation.vibration.keeps_nothing:
-        better = f"{smallest:.2g}, the smallest at this td"
-    return f"residual {residual:.2g}, more than {better}"
+        better = f"{smallest:.3f}, the smallest at this td"
+    return f"residual {residual:.3f}, more than {better}"
 
 
 def _describe_above_reference(means: Means | None, energy: float) -> Iterator[str]:

@@ -5,39 +5,66 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from d2rpick.choice.health import warn_about_engine
 from d2rpick.choice.switched.comparison import compare_with_reference
+from d2rpick.choice.switched.switch_times import sort_windows
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from d2rpick.choice.answers import PairVerdict
     from d2rpick.choice.question import Reference
+    from d2rpick.choice.switched.switch_times import SwitchedWindow
+    from d2rpick.histories.history import History
 
 
 def add_comparison(
     verdict: PairVerdict,
     reference: Reference,
     switched: Reference,
+    windows: Sequence[SwitchedWindow],
     min_mean: float = 0.0,
+    *,
+    tr_is_read: bool = False,
 ) -> PairVerdict:
     """Add the comparison of a finished switched run with the reference run to a verdict.
 
-    Both runs are read in the same way. ``min_mean`` is the smallest expected mean energy after td, relative to that of
-    the reference run [-].
+    Both runs are read in the same way. ``windows`` are those in which the switched run was rigid. ``min_mean`` is the
+    smallest expected mean energy after td, relative to that of the reference run [-]. ``tr_is_read`` is True if the tr
+    of the verdict was read from the switched run.
 
     Raises
     ------
     RangeError
         If one of the two runs does not continue after td.
     """
+    tr = verdict.candidate.tr
     comparison = compare_with_reference(
-        verdict.situation, verdict.candidate.tr, reference, switched, min_mean
+        verdict.situation,
+        tr,
+        reference,
+        switched,
+        sort_windows(windows, (tr, verdict.td)),
+        min_mean,
     )
+    interval = _find_output_interval(switched.history, tr) if tr_is_read else None
     return replace(
         verdict,
         switched=comparison,
-        computed=switched.history,
+        # A wrong energy is not drawn over that of the reference run.
+        computed=None if comparison.misreported else switched.history,
+        tr_interval=interval,
         # If the switched run deviates too much, the pair is inadmissible, whatever the reference run shows.
         admissible=verdict.admissible and not comparison.objections,
         reasons=verdict.reasons + comparison.objections,
         cautions=(*verdict.cautions, *warn_about_engine(switched.run.sources)),
     )
+
+
+def _find_output_interval(history: History, time: float) -> float:
+    """Return the length of the output interval of a history that contains a ``time`` [time]."""
+    later = int(np.searchsorted(history.time, time, "right"))
+    later = min(later, history.time.size - 1)
+    return float(history.time[later] - history.time[later - 1])

@@ -10,16 +10,22 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from d2rpick.base.errors import RangeError
-from d2rpick.choice.switched.frozen import FEWEST
+from d2rpick.choice.switched.frozen import FEWEST, compute_energy_range
+from d2rpick.choice.switched.same_model import (
+    MOST_MOMENTUM_ERROR,
+    check_before_window,
+    check_same_model,
+)
+from d2rpick.choice.switched.switch_times import SwitchedWindows
 from d2rpick.choice.switched.switched_run import choose_same_parts
 from d2rpick.flight.internal_energy import round_off
 from d2rpick.flight.window import LAST_DIGIT
-from d2rpick.histories.samples import find_stretches
 from d2rpick.vibration import measures
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
+    from d2rpick.base.spans import Times
     from d2rpick.choice.pair.situation import Situation
     from d2rpick.choice.question import Reference
     from d2rpick.histories.history import History, Samples, Track
@@ -27,12 +33,6 @@ if TYPE_CHECKING:
     from d2rpick.histories.run import OpenedRun
 
 
-# Runs belong to the same model if their energies before the switch differ by at most this fraction [-].
-_OF_ANOTHER_MODEL: Final = 0.2
-# If the switch time is unknown, runs are assumed to be deformable for this first fraction of the record [-].
-_EARLY: Final = 0.1
-# The motions of both runs are treated as equal if the momenta after td differ by at most this fraction [-].
-MOST_MOMENTUM_ERROR = 0.05
 # Smallest divisor of deviations, as a fraction of the largest momentum [-]; it is needed because a body may rest.
 _AT_REST = 0.01
 # A note is issued if the energy while rigid differs from the energy at td by more than this fraction [-].
@@ -43,15 +43,18 @@ _REPORTED_OFF = 0.01
 _STILL, _STILL_OF_VIBRATION = 1e-4, 1e-2
 # Relative tolerance for the energy near tr [-], because the solver may switch a state or two after the output.
 _ABOUT = 0.05
-# Number of trial times between two states in the search for the switch to rigid.
-_BETWEEN: Final = 101
+# Number of states before a rigid window in which the runs are compared if there are earlier windows.
+_STATES_BEFORE: Final = 2 * FEWEST
+# The windows of a switched run of which only the energy is known.
+_UNKNOWN_WINDOWS: Final = SwitchedWindows(None)
 
 
 class Comparison(NamedTuple):
     """Differences between a switched run and its reference run; unknown quantities are None.
 
-    The fields are the keys of the JSON output, except ``min_mean``, which is the smallest expected ratio of the means
-    [-].
+    The fields are the keys of the JSON output, except the last three: ``min_mean`` is the smallest expected ratio of
+    the means [-], ``has_energy`` is False if the energies after td are not compared, because they are only round-off or
+    all wrong, and ``misreported`` contains the names of the parts for which the solver reports a wrong energy after td.
 
     ``energy_frozen`` is the energy of the switched run at td, ``energy_td`` that of the reference run. ``rigid_from``
     and ``rigid_to`` are the first and last states of the window around the middle of (tr, td) in which the energy of
@@ -59,17 +62,19 @@ class Comparison(NamedTuple):
     to the time from td to ``end``, as do the next two fields, which ignore the first state. ``momentum_error`` is the
     largest deviation of the momentum, relative to the largest momentum of the reference run, and ``displacement`` the
     largest distance between the centres of the parts in both runs [length]. ``notes`` lists anomalies of the switched
-    run, and what was omitted or assumed when reading the switched run but not the reference run.
+    run, and what was omitted or assumed when reading the switched run but not the reference run. ``other_windows`` are
+    the further windows (tr, td) in which the switched run was rigid [time]. The energies of the switched run are None
+    if the solver reports wrong energies of all compared parts.
     """
 
     source: tuple[str, ...]
-    energy_frozen: float
+    energy_frozen: float | None
     energy_td: float
     level_ratio: float | None
     end: float
-    mean_after: float
+    mean_after: float | None
     mean_after_reference: float
-    spread_after: float
+    spread_after: float | None
     spread_after_reference: float
     momentum_error: float | None
     displacement: float | None
@@ -77,7 +82,10 @@ class Comparison(NamedTuple):
     rigid_to: float | None
     objections: tuple[str, ...]
     notes: tuple[str, ...]
+    other_windows: tuple[Times, ...] = ()
     min_mean: float = 0.0
+    has_energy: bool = True
+    misreported: tuple[str, ...] = ()
 
 
 def compare_with_reference(
@@ -85,12 +93,13 @@ def compare_with_reference(
     tr: float,
     reference: Reference,
     switched: Reference,
+    windows: SwitchedWindows,
     min_mean: float = 0.0,
 ) -> Comparison:
     """Compare a finished switched run with its reference run by the parts that both runs contain.
 
     Both runs are read in the same way. ``situation`` is that at td in the reference run; see ``compare_runs`` for
-    ``min_mean``.
+    ``windows`` and ``min_mean``.
 
     Raises
     ------
@@ -103,9 +112,9 @@ def compare_with_reference(
     together = flight.parts if flight.source == "momentum" else flight.parts or parts
     pair = tr, situation.td
     judged = choose_same_parts(reference, switched, pair)
-    end = np.inf
+    end = min((window.tr for window in windows.later), default=np.inf)
     if situation.latest_td > situation.td:
-        end = situation.latest_td
+        end = min(end, situation.latest_td)
     centres: tuple[Track | None, Track | None] = (None, None)
     if parts:
         centres = (run.centre(parts), switched.run.centre(parts))
@@ -119,10 +128,14 @@ def compare_with_reference(
         centres=centres,
         is_reported=judged.is_reported,
         min_mean=min_mean,
+        windows=windows,
     )
+    others = (*windows.earlier, *windows.later)
     return comparison._replace(
         objections=(*judged.objections, *comparison.objections),
         notes=(*judged.notes, *comparison.notes),
+        other_windows=tuple((window.tr, window.td) for window in others),
+        misreported=judged.misreported,
     )
 
 
@@ -135,7 +148,7 @@ def _read_momentum(run: OpenedRun, parts: Sequence[Part] | None) -> Track | None
 def compare_runs(
     reference: History,
     switched: History,
-    pair: tuple[float, float],
+    pair: Times,
     end: float,
     tolerance: float,
     momenta: tuple[Track | None, Track | None],
@@ -143,6 +156,7 @@ def compare_runs(
     *,
     is_reported: bool = True,
     min_mean: float = 0.0,
+    windows: SwitchedWindows = _UNKNOWN_WINDOWS,
 ) -> Comparison:
     """Check whether a switched run was rigid from tr to td, and compare its energy after td with the reference run.
 
@@ -163,6 +177,8 @@ def compare_runs(
     min_mean : float
         Smallest expected mean energy after td, relative to that of the reference run [-]; the largest one is 2 -
         ``min_mean``.
+    windows : SwitchedWindows
+        The rigid windows of the switched run, as far as they are known.
 
     Raises
     ------
@@ -171,36 +187,39 @@ def compare_runs(
     """
     tr, td = pair
     after = _read_energies_after(reference, switched, td, end)
-    frozen = float(after.switched[0])
     energy_td = reference.energy_at(td)
     notes = [note for note in switched.notes if note not in reference.notes]
-    energy_rigid = after.reported_while_rigid
-    if energy_rigid is not None:
-        reported = f"the solver reports an energy of {energy_rigid:.6g} while the parts are rigid"
-        if frozen > 0:
-            reported += f", {energy_rigid / frozen:.4g} times the energy right after td, {frozen:.6g}"
-        notes.append(
-            f"{reported}; this is a fault of some solvers for rigid solid elements, and the value is not used"
-        )
+    notes += _note_energy_while_rigid(after, is_reported=is_reported)
     error = _compute_relative_distance(*momenta, td, after.end)
     limit = _find_limit_of_change(reference, switched, tr, td)
-    rigid = _find_rigid_window(switched, tr, td, limit)
+    rigid = _find_rigid_window(switched, pair, limit, windows)
+    first_rigid = min(rigid[0] if rigid else tr, tr)
     objections = [
-        *check_same_model(reference, switched, min(rigid[0] if rigid else tr, tr)),
+        *check_same_model(reference, switched, min(first_rigid, windows.first_rigid)),
         *_check_rigid_window(reference, switched, rigid, tr, td, limit),
     ]
-    if is_reported:
+    differing = [
+        *_check_before_window(reference, switched, momenta, windows, first_rigid)
+    ]
+    objections += differing
+    # What follows from an earlier window says nothing about this one.
+    if is_reported and not differing:
         objections += _check_energies_after(reference, after, pair, tolerance, min_mean)
-    objections += _check_momentum(error)
+    if not differing:
+        objections += _check_momentum(error)
+    rounding = round_off(reference)
+    mean_reference = float(after.reference.mean())
+    frozen = float(after.switched[0])
+    has_level = is_reported and energy_td > rounding
     return Comparison(
         source=switched.source,
-        energy_frozen=frozen,
+        energy_frozen=frozen if is_reported else None,
         energy_td=energy_td,
-        level_ratio=frozen / energy_td if energy_td > 0 else None,
+        level_ratio=frozen / energy_td if has_level else None,
         end=after.end,
-        mean_after=float(after.switched.mean()),
-        mean_after_reference=float(after.reference.mean()),
-        spread_after=float(after.switched.std()),
+        mean_after=float(after.switched.mean()) if is_reported else None,
+        mean_after_reference=mean_reference,
+        spread_after=float(after.switched.std()) if is_reported else None,
         spread_after_reference=float(after.reference.std()),
         momentum_error=error,
         displacement=_compute_distance(*centres, td, after.end),
@@ -209,6 +228,47 @@ def compare_runs(
         objections=tuple(objections),
         notes=tuple(notes),
         min_mean=min_mean,
+        has_energy=is_reported and mean_reference > rounding,
+    )
+
+
+def _check_before_window(
+    reference: History,
+    switched: History,
+    momenta: tuple[Track | None, Track | None],
+    windows: SwitchedWindows,
+    first_rigid: float,
+) -> Iterator[str]:
+    """Yield an objection if an earlier rigid window has changed the switched run before the judged window.
+
+    Only the last states before the ``first_rigid`` state [time] are compared, because a contact that begins slightly
+    earlier or later matters only if the motion after it is another one.
+    """
+    if not windows.earlier:
+        return
+    before = switched.time[switched.time < first_rigid][-_STATES_BEFORE:]
+    if not before.size:
+        return
+    start = max(windows.earlier[-1].td, float(before[0]))
+    error = _compute_relative_distance(*momenta, start, float(before[-1]))
+    yield from check_before_window(reference, switched, start, first_rigid, error)
+
+
+def _note_energy_while_rigid(
+    after: _EnergiesAfter, *, is_reported: bool
+) -> Iterator[str]:
+    """Yield a note if the solver reports a wrong energy while the parts are rigid, but the right one after td."""
+    energy_rigid = after.reported_while_rigid
+    if energy_rigid is None or not is_reported:
+        return
+    frozen = float(after.switched[0])
+    reported = (
+        f"the solver reports an energy of {energy_rigid:.6g} while the parts are rigid"
+    )
+    if frozen > 0:
+        reported += f", {energy_rigid / frozen:.4g} times the energy right after td, {frozen:.6g}"
+    yield (
+        f"{reported}; this is a fault of some solvers for rigid solid elements, and the value is not used"
     )
 
 
@@ -288,24 +348,24 @@ def _find_limit_of_change(
     """Return the largest change of an energy that is treated as zero, at least the rounding error [energy]."""
     level = float(np.abs(switched.energies_at(np.array((tr + td) / 2))))
     digits = max(LAST_DIGIT * level, switched.energy_precision.quantum(level))
-    vibrates = _compute_energy_range(reference, tr, td)
+    vibrates = compute_energy_range(reference, tr, td)
     rounding = round_off(reference)
     if level + vibrates <= rounding:
         return max(digits, rounding)
     return max(digits, min(_STILL * level, _STILL_OF_VIBRATION * vibrates))
 
 
-def _compute_energy_range(history: History, start: float, end: float) -> float:
-    """Return the range of the energy between two times [energy]."""
-    inside = history.between(start, end)[1]
-    at_ends = history.energies_at(np.array([start, end]))
-    return float(np.ptp(np.append(inside, at_ends)))
-
-
 def _find_rigid_window(
-    switched: History, tr: float, td: float, limit: float
-) -> tuple[float, float] | None:
-    """Return the first and last time of constant energy around the middle of (tr, td); None if there is no state."""
+    switched: History, pair: Times, limit: float, windows: SwitchedWindows
+) -> Times | None:
+    """Return the first and last rigid state of the judged window [time]; None if there is no state.
+
+    If the output of the parts does not show the window, it is that of constant energy around the middle of (tr, td).
+    """
+    judged = windows.judged
+    if judged and judged.rigid:
+        return judged.first, judged.td
+    tr, td = pair
     time = switched.time
     energy = switched.energy
     middle = int(np.argmin(np.abs(time - (tr + td) / 2)))
@@ -320,7 +380,7 @@ def _find_rigid_window(
 def _check_rigid_window(
     reference: History,
     switched: History,
-    rigid: tuple[float, float] | None,
+    rigid: Times | None,
     tr: float,
     td: float,
     limit: float,
@@ -340,7 +400,7 @@ def _check_rigid_window(
 
     def lasts_longer(start: float, end: float) -> bool:
         return (
-            end - start > room and _compute_energy_range(reference, start, end) > limit
+            end - start > room and compute_energy_range(reference, start, end) > limit
         )
 
     if (
@@ -351,23 +411,6 @@ def _check_rigid_window(
     ):
         rigid_text = f"the energy of the switched run is constant from {rigid[0]:.6g} to {rigid[1]:.6g}"
         yield f"{rigid_text}, not from tr {tr:g} to td {td:g}"
-
-
-def check_same_model(
-    reference: History, switched: History, end: float
-) -> Iterator[str]:
-    """Yield an objection if the energies of two runs differ before ``end`` [time], while both are deformable."""
-    start = max(reference.start, switched.start)
-    time, energy = reference.between(start, min(end, switched.end))
-    largest = float(np.abs(energy).max(initial=0.0))
-    if time.size < FEWEST or largest <= round_off(reference):
-        return
-    difference = float(np.abs(switched.energies_at(time) - energy).max()) / largest
-    if difference > _OF_ANOTHER_MODEL:
-        yield (
-            f"the energies of the two runs differ by {difference:.0%} before {end:.6g}, when both are deformable, so "
-            "they seem to be runs of different models"
-        )
 
 
 def _check_locked_in_energy(
@@ -390,7 +433,7 @@ def _check_locked_in_energy(
 def _check_energies_after(
     reference: History,
     after: _EnergiesAfter,
-    pair: tuple[float, float],
+    pair: Times,
     tolerance: float,
     min_mean: float,
 ) -> Iterator[str]:
@@ -420,70 +463,6 @@ def _check_momentum(error: float | None) -> Iterator[str]:
     if error is not None and error > MOST_MOMENTUM_ERROR:
         moved = f"the momentum of the switched run after td differs by {error:.1%}"
         yield f"{moved} from that of the reference run, so it moves differently"
-
-
-def find_switch_times(switched: History, reference: History) -> tuple[float, float]:
-    """Find tr and td of a switched run: between them, its energy is constant but that of the reference run is not.
-
-    Returns
-    -------
-    tr, td : float
-        tr lies between the last state before the energy is constant and the first state of constant energy, at the time
-        at which the reference run has this energy; td is the last state of constant energy [time].
-
-    Raises
-    ------
-    RangeError
-        If there are no such times, for example because nothing vibrates in the flight.
-    """
-    time = switched.time
-    energy = switched.energy
-    limit = np.maximum(
-        LAST_DIGIT * np.abs(energy), switched.energy_precision.quanta(energy)
-    )
-    rounding = round_off(reference)
-    # The energies of rigid or resting parts are only round-off, which may change during a fall.
-    unchanged = np.abs(np.diff(energy)) <= np.maximum(limit[1:], rounding)
-    still = find_stretches(np.append(False, unchanged), FEWEST)
-    spans = [(max(span.start - 1, 0), span.stop - 1) for span in still]
-    moving = []
-    for first, last in spans:
-        largest = max(rounding, 2 * limit[first : last + 1].max())
-        if (
-            _compute_energy_range(reference, float(time[first]), float(time[last]))
-            > largest
-        ):
-            moving.append((first, last))
-    if not moving:
-        reason = _explain_why_no_times(switched, reference, spans)
-        early = reference.start + _EARLY * reference.duration
-        reason = "; ".join((*check_same_model(reference, switched, early), reason))
-        cure = (
-            switched.left_beside
-            or "; give the run with the switching cards, or `tr` and `td`"
-        )
-        raise RangeError(f"{', '.join(switched.source)}: {reason}{cure}")
-    first, last = max(moving, key=lambda span: time[span[1]] - time[span[0]])
-    times_before = np.linspace(time[max(first - 1, 0)], time[first], _BETWEEN)
-    tr = times_before[
-        np.abs(reference.energies_at(times_before) - energy[first]).argmin()
-    ]
-    return float(tr), float(time[last])
-
-
-def _explain_why_no_times(
-    switched: History, reference: History, spans: Sequence[tuple[int, int]]
-) -> str:
-    """Explain why no rigid window was found; ``spans`` are ranges (first, last) of states with constant energy."""
-    if np.array_equal(switched.time, reference.time) and np.array_equal(
-        switched.energy, reference.energy
-    ):
-        return "both runs have the same energies, so it may be the reference run again"
-    if not spans:
-        return f"the energy never stays constant for {FEWEST} states, so no part seems to have been rigid"
-    first, last = spans[0]
-    start, end = switched.time[first], switched.time[last]
-    return f"the energy stays constant from {start:.6g} to {end:.6g}, but that of the reference run does too"
 
 
 def _is_reported_wrong(rigid: float, energies_after: Samples) -> bool:

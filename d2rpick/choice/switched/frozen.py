@@ -57,6 +57,13 @@ def _is_frozen(energy: Samples, stretch: slice, limit: float, rounding: float) -
     return vibrates and moving.size > 0 and bool(after[moving[0]] < level)
 
 
+def compute_energy_range(history: History, start: float, end: float) -> float:
+    """Return the range of the energy between two times [energy]."""
+    inside = history.between(start, end)[1]
+    at_ends = history.energies_at(np.array([start, end]))
+    return float(np.ptp(np.append(inside, at_ends)))
+
+
 def refuse_switched(history: History, start: float | None, td: float) -> None:
     """Raise RangeError if the parts were rigid at some time from the start of the flight to td [time].
 

@@ -148,7 +148,7 @@ def prepare_switched_history(
         for time in (tr, td):
             history.energy_at(time)
         cautions += _warn_about_deforming(reference, tr, td)
-    absent = _find_absent_windows(reference)
+    absent = find_absent_windows(reference)
     new = []
     for absent_window in absent or _find_frozen_windows(history):
         start, end = absent_window.start, absent_window.end
@@ -189,7 +189,7 @@ def find_rigid_times(reference: Reference) -> tuple[Times, ...]:
     moves.
     """
     windows = tuple(
-        (momenta.start, momenta.end) for momenta in _find_absent_windows(reference)
+        (momenta.start, momenta.end) for momenta in find_absent_windows(reference)
     )
     history = reference.history
     run = reference.run
@@ -294,15 +294,16 @@ def _warn_about_deforming(
     )
 
 
-class _AbsentWindow(NamedTuple):
-    """A window [time] in which the ``rigid`` parts have no kinetic energy.
+class RigidWindow(NamedTuple):
+    """A window [time] in which the ``rigid`` parts have no kinetic energy; empty if only the energy shows the window.
 
-    ``whole`` is True if no other part deforms, ``is_frozen`` if the rigid parts keep a deformation.
+    ``end`` is the time of switching back if a state is written then, else the last rigid state. ``whole`` is True if no
+    other part deforms, ``is_frozen`` if the rigid parts keep a deformation.
     """
 
     start: float
     end: float
-    rigid: str
+    rigid: tuple[Part, ...]
     whole: bool
     is_frozen: bool = True
 
@@ -313,11 +314,12 @@ class _AbsentWindow(NamedTuple):
         if self.whole:
             window_text = f"the parts were rigid {when}, within one output interval; the window is treated as done"
             return Caution("rigid-times", window_text)
-        window_text = f"{when} these parts were rigid: {self.rigid}; the others deform, so the window is not done"
+        names = _list_part_names(self.rigid)
+        window_text = f"{when} these parts were rigid: {names}; the others deform, so the window is not done"
         return Caution("partly-rigid", window_text)
 
 
-def _find_absent_windows(reference: Reference) -> tuple[_AbsentWindow, ...]:
+def find_absent_windows(reference: Reference) -> tuple[RigidWindow, ...]:
     """Return the windows in which parts have no kinetic energy although the model moves."""
     parts = _select_deformable(reference)
     balance = reference.history.balance
@@ -330,23 +332,52 @@ def _find_absent_windows(reference: Reference) -> tuple[_AbsentWindow, ...]:
     time = reference.history.time
     rounding = round_off(reference.history)
     moves = np.interp(time, balance.time, balance.kinetic) > rounding
-    gone = ((kinetic == 0) & kinetic.any(axis=0)).any(axis=1) & moves
+    gone = ((kinetic == 0) & kinetic.any(axis=0)).any(axis=1)
     energies = reference.run.part_energies(parts)
     windows = []
-    for states in find_stretches(gone, FEWEST):
+    for moving in find_stretches(gone & moves, FEWEST):
+        states = slice(_find_first_still_state(gone, moves, moving.start), moving.stop)
         start, end = time[states][[0, -1]].tolist()
         rigid = detect_rigid_parts(reference.run, parts, time, start, end)
         rigid = (kinetic[states] == 0).all(axis=0) if rigid is None else rigid
-        names = [
-            part.title or f"part {part.id}"
+        rigid_parts = tuple(
+            part
             for part, is_rigid in zip(parts, rigid.tolist(), strict=True)
             if is_rigid
-        ]
+        )
         deform = ~rigid & (np.ptp(energies[states], axis=0) > rounding)
         is_frozen = bool(energies[states][:, rigid].max(initial=0.0) > rounding)
         whole = not deform.any()
-        windows.append(_AbsentWindow(start, end, list_names(names), whole, is_frozen))
+        if _is_still_frozen(energies[:, rigid], states.stop, rounding):
+            end = float(time[states.stop])
+        windows.append(RigidWindow(start, end, rigid_parts, whole, is_frozen))
     return tuple(windows)
+
+
+def _is_still_frozen(energies: Samples, state: int, rounding: float) -> bool:
+    """Return True if the first state after a rigid window shows the frozen energies, because it is written at td.
+
+    Some solvers report a wrong energy of rigid solids, so one deformed part with the same energy is enough. If no part
+    is deformed, nothing vibrates after td either. ``energies`` (n, parts) are those of the rigid parts [energy].
+    """
+    if state >= len(energies):
+        return False
+    frozen = energies[state - 1]
+    is_deformed = np.abs(frozen) > rounding
+    is_same = np.abs(energies[state] - frozen) <= LAST_DIGIT * np.abs(frozen)
+    return not is_deformed.any() or bool((is_same & is_deformed).any())
+
+
+def _find_first_still_state(
+    gone: NDArray[np.bool_], moves: NDArray[np.bool_], first: int
+) -> int:
+    """Return the first of the states before ``first`` in which the model rests, so that a rigid part cannot be seen.
+
+    A run that begins at rest with rigid parts is rigid from its first state. ``gone`` (n,) is True if parts have no
+    kinetic energy, ``moves`` (n,) if the model has.
+    """
+    others = np.flatnonzero(~gone[:first] | moves[:first])
+    return int(others.max(initial=-1)) + 1
 
 
 def refuse_partly_rigid(reference: Reference, start: float | None, td: float) -> None:
@@ -356,21 +387,22 @@ def refuse_partly_rigid(reference: Reference, start: float | None, td: float) ->
     at the start of the record.
     """
     earliest = reference.history.start if start is None else start
-    for window in _find_absent_windows(reference):
+    for window in find_absent_windows(reference):
         overlaps = window.end > earliest and window.start < td
         if overlaps and window.is_frozen and not window.whole:
             span = f"from {window.start:.6g} to {window.end:.6g}"
             source = ", ".join(reference.history.source)
+            names = _list_part_names(window.rigid)
             raise RangeError(
-                f"{source}: this is a switched run: these parts were rigid {span}: {window.rigid}; choose times from "
+                f"{source}: this is a switched run: these parts were rigid {span}: {names}; choose times from "
                 "the reference run, and compare this one with it (d2rpick verify)"
             )
 
 
-def _find_frozen_windows(history: History) -> Iterator[_AbsentWindow]:
+def _find_frozen_windows(history: History) -> Iterator[RigidWindow]:
     """Yield the windows in which the energy shows that the chosen parts were rigid."""
     for start, end in find_frozen_times(history):
-        yield _AbsentWindow(start, end, "the chosen parts", whole=True)
+        yield RigidWindow(start, end, (), whole=True)
 
 
 def _select_deformable(
@@ -417,7 +449,8 @@ def detect_rigid_parts(
 class SameParts(NamedTuple):
     """Energies of the same parts in both runs, with objections and notes about the other parts.
 
-    ``is_reported`` is False if the solver reports wrong energies of all parts.
+    ``misreported`` contains the names of the parts for which the solver reports a wrong energy after td;
+    ``is_reported`` is False if these are all parts.
     """
 
     reference: History
@@ -425,6 +458,7 @@ class SameParts(NamedTuple):
     objections: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     is_reported: bool = True
+    misreported: tuple[str, ...] = ()
 
 
 def choose_same_parts(
@@ -477,20 +511,17 @@ def _choose_compared_parts(
                 f"judged by the parts that were rigid: {_list_part_names(still)}"
             )
         else:
-            deforming = (part for part in parts if part not in still)
-            objections.append(
-                f"not rigid from tr {pair[0]:g} to td {pair[1]:g} in the switched run: {_list_part_names(deforming)}"
-            )
+            deforming = _find_deforming(switched, parts, pair, ~rigid)
+            if deforming:
+                names = _list_part_names(deforming)
+                objections.append(
+                    f"not rigid from tr {pair[0]:g} to td {pair[1]:g} in the switched run: {names}"
+                )
     misreported = _find_misreported(without, switched.run, chosen, pair)
     if not misreported and chosen is parts:
         return SameParts(history, switched.history, tuple(objections))
     comparable = tuple(part for part in chosen if part not in misreported)
-    if not comparable:
-        energies_text = f"the energies of {_list_part_names(misreported)}"
-        objections.append(
-            f"{energies_text} are wrong after td, so only the motion can be compared"
-        )
-    elif misreported:
+    if comparable and misreported:
         left_out = f"left out of the comparison: {_list_part_names(misreported)}"
         notes.append(
             f"{left_out}, whose energy is wrong after td, as some solvers report it for solids that were rigid"
@@ -501,7 +532,28 @@ def _choose_compared_parts(
     )
     energies = without.run.history(selection), switched.run.history(selection)
     return SameParts(
-        *energies, tuple(objections), tuple(notes), is_reported=bool(comparable)
+        *energies,
+        tuple(objections),
+        tuple(notes),
+        is_reported=bool(comparable),
+        misreported=tuple(part.name for part in misreported),
+    )
+
+
+def _find_deforming(
+    switched: Reference,
+    parts: tuple[Part, ...],
+    pair: Times,
+    is_moving: NDArray[np.bool_],
+) -> tuple[Part, ...]:
+    """Return the moving parts whose energy changes between tr and td by more than round-off."""
+    inside = find_window(switched.run.part_time, *pair)
+    changes = np.ptp(switched.run.part_energies(parts)[inside], axis=0)
+    deforms = is_moving & (changes > round_off(switched.history))
+    return tuple(
+        part
+        for part, is_deforming in zip(parts, deforms.tolist(), strict=True)
+        if is_deforming
     )
 
 
