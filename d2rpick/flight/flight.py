@@ -503,11 +503,8 @@ def _limit_to_level(
         whole = None if damped is None else damped[-1 if flight.gravity else 0]
         if rises_as_it_yields(time, energy, whole, flight.start, start, flight.end):
             start = flight.start
-    if (
-        start is None
-        or start > td
-        or flight.end - start < SHORTEST * (time[-1] - time[0])
-    ):
+    shortest = SHORTEST * (time[-1] - time[0])
+    if start is None or start > td or flight.end - start < shortest:
         return None
     if damped is not None and not flight.gravity:
         first, last = np.interp((flight.start, start), time, damped[0])
@@ -522,9 +519,11 @@ def _find_nearest(
     """For a td outside all flights, return the last flight before td if there is one, otherwise the next flight."""
     flights = witness.flights()
     earlier_flights = [flight for flight in flights if flight.end < td]
-    nearest = (
-        earlier_flights[-1] if earlier_flights else flights[0] if flights else None
-    )
+    nearest: FreeFlight | None = None
+    if earlier_flights:
+        nearest = earlier_flights[-1]
+    elif flights:
+        nearest = flights[0]
     return Seen(nearest, witness.source if nearest else None, refusal, doubts)
 
 

@@ -335,14 +335,16 @@ def _cut_off_hidden_push(
     are ignored, because they cannot be resolved.
     """
     first, last = window
-    wide = find_longest_window(law, (first + last) // 2, 4 * room)
+    wide_first, wide_last = find_longest_window(law, (first + last) // 2, 4 * room)
     most_states = round(_ENDS * (last - first))
-    return (
-        first + min(most_states, max(0, first - wide[0] - 1)) if wide[0] > 0 else first,
-        last - min(most_states, max(0, wide[1] - last - 1))
-        if wide[1] < law.time.size - 1
-        else last,
-    )
+    # A window that reaches an end of the record shows no force there.
+    if wide_first > 0:
+        gained_states = max(0, first - wide_first - 1)
+        first += min(most_states, gained_states)
+    if wide_last < law.time.size - 1:
+        gained_states = max(0, wide_last - last - 1)
+        last -= min(most_states, gained_states)
+    return first, last
 
 
 def _is_long_enough(time: Samples, window: tuple[int, int]) -> bool:
