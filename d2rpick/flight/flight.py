@@ -37,7 +37,7 @@ BY_ENERGIES: Final = ("contact-energy", "energy-balance")
 # Largest work of a load on the parts in a flight, relative to their internal energy [-].
 # Such work changes the deformation by 2 %; smaller changes do not affect the ranking of pairs.
 MOST_WORK: Final = 0.04
-# Sources that cover the contacts of all parts, so they must confirm each flight from a more reliable source.
+# Sources that cover the contacts of all parts. They must confirm each flight that a more reliable source shows.
 _AGREEING: Final = ("contact-force", "contact-energy")
 # Sources that may miss a load, because some forces are not written and fixed walls do no work.
 _PARTIAL: Final = (*BY_ENERGIES, "contact-force")

@@ -33,8 +33,9 @@ SHORTEST, FEWEST = 0.05, 12
 # Smallest number of states from which a load, gravity and damping can be separated; twice the number of unknowns.
 FEWEST_STATES_OF_WORK: Final = 6
 # _ENDS: fraction of a window that is excluded at each end when the misfit inside the flight is determined [-].
-# _REACH_OF_DIGITS: factor by which a misfit due to printed digits may grow if the ends are included [-].
-# _REACH: factor by which any other misfit may grow if the ends are included [-].
+# The misfit of the whole window may exceed the misfit without its ends by the following factors [-].
+# _REACH_OF_DIGITS: factor for the part of the misfit that is due to the rounding of printed numbers.
+# _REACH: factor for the rest of the misfit.
 _ENDS, _REACH_OF_DIGITS, _REACH = 0.1, 1.5, 3.0
 # Relative resolution of all quantities [-], because solvers sum in single precision.
 ROUND_OFF = 1e-7
