@@ -465,7 +465,7 @@ def _compare_with_signs(whole: Vibration, basis: str, model: SignedModel) -> Vib
 
 
 def is_doubtful(whole: Vibration) -> bool:
-    """Return True if no oscillator is known, or if its misfit is so large that its sign may be wrong."""
+    """Return True if no oscillator fits, or only so badly that the sign of the deformation may be wrong."""
     return (
         not isinstance(whole.whole, OscillatorEnergy)
         or whole.whole.fit.hidden_share > SMALLEST
