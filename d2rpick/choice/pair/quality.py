@@ -559,13 +559,16 @@ def _describe_cure_for_modes(situation: Situation) -> str:
     It is empty if all other vibrating parts are springs or the like, whose energy a choice of parts would not add.
     """
     other_parts = situation.parts_to_add
+    others_are_springs = bool(situation.together.not_chosen.parts) and not other_parts
+    if others_are_springs:
+        return ""
     if situation.history.parts is None and not other_parts:
         return f"{_NAME_PARTS}, if the files contain parts"
     if other_parts:
         names = list_names([part.name for part in other_parts], most=_NAMED)
         vibrates = "it vibrates" if len(other_parts) == 1 else "they vibrate"
         return f"also make {names} rigid, because {vibrates} together with the chosen parts"
-    return "" if situation.together.not_chosen.parts else _MORE_OFTEN
+    return _MORE_OFTEN
 
 
 def _describe_wrong_tr(
