@@ -459,6 +459,22 @@ def _raise_grade_by_worth(alone: Grade, worth: Worth | None) -> Grade:
     return Grade("fair", alone.causes)
 
 
+def refuse_error(quality: Quality, errors: Sequence[str]) -> Quality:
+    """Return the grades of a pair that its ``errors`` make inadmissible, however little they affect the next contact.
+
+    Nothing changes unless the next contact has raised the grade of the vibration.
+    """
+    alone = quality.alone
+    if not errors or quality.vibration.grade == alone.grade:
+        return quality
+    first, *others = alone.causes
+    refusal = "d2rpick accepts no such pair, even if the error hardly matters in the next contact"
+    reason = f"{first.reason}; {'; '.join(errors)}: {refusal}"
+    cause = first._replace(reason=reason)
+    refused = alone._replace(causes=(cause, *others))
+    return quality._replace(vibration=refused, alone=refused)
+
+
 def _list_causes_for_poor(
     situation: Situation, best: Candidate, best_residual: float | None
 ) -> list[Cause]:

@@ -679,11 +679,12 @@ def _describe_in_load(situation: Situation) -> str:
 
 def _describe_keeps_nothing(situation: Situation, residual: float) -> str:
     """State that a pair's residual exceeds that of a release without vibration, or the smallest residual at this td."""
-    smallest = situation.vibration.least_residual or 0.0
-    better = f"{NOTHING_KEPT:g}, the residual of a release without any vibration"
+    limit = NOTHING_KEPT
+    better = f"{limit:g}, the residual of a release without any vibration"
     if situation.vibration.keeps_nothing:
-        better = f"{smallest:.2g}, the smallest at this td"
-    return f"residual {residual:.2g}, more than {better}"
+        limit = situation.vibration.least_residual or 0.0
+        better = f"{limit:.2g}, the smallest at this td"
+    return f"residual {format_beyond_limit(residual, limit)}, more than {better}"
 
 
 def _describe_above_reference(means: Means | None, energy: float) -> Iterator[str]:
