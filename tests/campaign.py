@@ -185,7 +185,7 @@ def draw_toml_value(random: Random, depth: int) -> str:
     return str(random.choice((0, 1, -1, 2**63, 10**400, random.randrange(1000))))
 
 
-FORMATS: Final[dict[str, Callable[[Random], bool]]] = {
+INPUTS: Final[dict[str, Callable[[Random], bool]]] = {
     "glstat": glstat, "matsum": matsum, "binout": binout, "radioss-th": time_history, "hdf5": hdf5, "csv": csv,
     "d3plot": d3plot, "curves": curves, "deck": deck, "companions": companions,
     "settings": settings,
@@ -193,7 +193,7 @@ FORMATS: Final[dict[str, Callable[[Random], bool]]] = {
 
 
 CHECKS: Final[dict[str, Callable[[Random], bool]]] = {
-    **FORMATS,
+    **INPUTS,
     **{name: partial(check_relation, name) for name in RELATIONS},
 }
 
@@ -230,7 +230,7 @@ def main() -> int:
     if options.only:
         print(run_case(options.only[0], options.seed, int(options.only[1])))
         return 0
-    forms = [*(RELATIONS if options.relations else FORMATS)]
+    forms = [*(RELATIONS if options.relations else INPUTS)]
     inputs_per_format = -(-options.inputs // len(forms))
     size = _FEW if options.relations else _CHUNK
     tasks = [

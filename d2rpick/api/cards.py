@@ -17,6 +17,7 @@ from d2rpick.base.options import (
     make_option,
     make_option_name,
 )
+from d2rpick.deck.beside import SOME_NODES, SOME_PARTS, find_run_name
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -113,7 +114,8 @@ class Cards:
         "Radioss: end of the run.  [default: end of the history]", TIME, "T"
     )
     name: str | None = make_option(
-        "Radioss: name of the run.  [default: Root]", metavar="NAME"
+        "Radioss: name of the run if neither deck nor history gives it.  [default: Root]",
+        metavar="NAME",
     )
     contact: int | None = make_option(
         "Contact whose force switches (solvers ls-dyna-contact, radioss-contact).",
@@ -223,7 +225,8 @@ class Cards:
         printing = Printing()
         deck = question.deck
         if deck is None:
-            return printing, ()
+            name = find_run_name(question.reference.history.source)
+            return printing._replace(name=name or printing.name), ()
         from d2rpick.deck.printing import SOLVERS
         from d2rpick.deck.suiting import find_suiting
 
@@ -274,6 +277,10 @@ def parse_id_ranges(name: str, texts: Sequence[str]) -> list[int]:
     for piece in (piece.strip() for text in texts for piece in text.split(",")):
         match = re.fullmatch(_RANGE, piece, re.ASCII)
         if not match:
+            if piece in (SOME_PARTS, SOME_NODES):
+                raise ArgumentError(
+                    f"{name}: {piece} stands for ids that the files do not contain; give those of your deck"
+                )
             if piece.isdecimal():
                 hint = "; an id has at most 10 digits"
             elif name == "--part":

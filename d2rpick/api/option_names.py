@@ -24,6 +24,7 @@ ARGUMENTS: Final = (
         "before",
         "wait",
         "min_mean_energy",
+        "switched",
     ),
 )
 # Options whose names differ from the names of their arguments.

@@ -316,9 +316,11 @@ def verify(
 def check_pair(tr: float | None, td: float | None, switched: object) -> None:
     """Refuse an incomplete pair. Both times are needed unless a switched run defines them."""
     if not switched and (tr is None or td is None):
-        raise ArgumentError(
-            f"give `{'tr' if tr is None else 'td'}` too, or a finished switched run"
-        )
+        if tr is None and td is None:
+            times = "`tr` and `td`"
+        else:
+            times = "`tr` too" if tr is None else "`td` too"
+        raise ArgumentError(f"give {times}, or a finished switched run as `switched`")
 
 
 def judge_pair(

@@ -31,6 +31,21 @@ class FormatError(D2RPickError):
     """A file cannot be read as an energy history."""
 
 
+class EnergyChoiceError(FormatError):
+    """A table does not show which of its ``columns`` is the internal energy, so the user has to choose one of them.
+
+    ``columns`` are the numbers of the columns that may be meant, as values of the argument ``energy``.
+    """
+
+    def __init__(self, message: str, columns: tuple[str, ...]) -> None:
+        super().__init__(message, columns)
+        self.columns = columns
+
+    def __str__(self) -> str:
+        """Return the message alone."""
+        return str(self.args[0])
+
+
 class ChangedError(D2RPickError):
     """A file was rewritten while it was read, so its content mixes two versions and cannot be used."""
 

@@ -25,6 +25,7 @@ from d2rpick.choice.pair.candidates import Candidate, Candidates, Pair, judge_ti
 from d2rpick.choice.pair.decision import (
     CHECK_SWITCHED_RUN,
     CHOOSE_ANOTHER,
+    GIVE_END_OF_LOAD,
     Decision,
     decide,
 )
@@ -34,7 +35,6 @@ from d2rpick.choice.pair.quality import (
     ROUNDING,
     Quality,
     list_exceeded_limits,
-    omit_comparison,
     rank_candidates,
 )
 from d2rpick.choice.pair.situation import AnswerAtTd, Situation, examine_td
@@ -100,13 +100,23 @@ class PairVerdict(AnswerAtTd):
 
     @cached_property
     def decision(self) -> Decision:
-        """Verdict on the pair, with its reason and cure."""
+        """Verdict on the pair, with the reason and the remedy."""
         decision = self._decide(None)
         if decision.grade == POOR:
             decision = self._decide(self.better)
         if self._is_refuted:
             return decision
         return compare_in_flight(decision, self.situation, self.candidate)
+
+    @property
+    def _cure_of_objections(self) -> str:
+        """Advice on a pair that is not admissible."""
+        if self._is_refuted:
+            return CHECK_SWITCHED_RUN
+        flight = self.situation.flight
+        if flight.start is None and not flight.refusal:
+            return GIVE_END_OF_LOAD
+        return CHOOSE_ANOTHER
 
     def _decide(self, better: Pair | None) -> Decision:
         """Return the verdict on the pair; ``better`` is a better pair, or None if no better pair is known."""
@@ -119,12 +129,13 @@ class PairVerdict(AnswerAtTd):
             errors=self.errors,
             best_residual=self._best_residual,
             better=better,
-            cure_of_objections=CHECK_SWITCHED_RUN
-            if self._is_refuted
-            else CHOOSE_ANOTHER,
+            cure_of_objections=self._cure_of_objections,
         )
         if self.switched is None:
             return decision
+        # Imported here to keep start-up fast.
+        from d2rpick.choice.pair.cures import omit_comparison
+
         quality = omit_comparison(decision.quality)
         return decision._replace(quality=quality, is_compared=True)
 
@@ -226,8 +237,11 @@ def verify_at(situation: Situation, tr: float) -> PairVerdict:
     outside = td > situation.latest_td or (
         situation.earliest_tr is not None and td <= situation.earliest_tr
     )
-    limits_td = situation.settings.max_kinetic_share is not None
-    td_ok = None if share is None else limits_td or share <= POOR_KINETIC_SHARE
+    td_ok: bool | None = None
+    if share is not None:
+        # A limit of the user replaces the usual one; `exceeded` shows whether the td exceeds it.
+        has_own_limit = situation.settings.max_kinetic_share is not None
+        td_ok = has_own_limit or share <= POOR_KINETIC_SHARE
     if outside or any(excess.is_td_wrong for excess in exceeded):
         td_ok = False
     return PairVerdict(
@@ -266,6 +280,8 @@ def list_shown_errors(judged: Candidates, candidate: Candidate) -> tuple[str, ..
 
 def _check_order(tr: float, td: float) -> None:
     """Raise RangeError if tr is not before td."""
+    if tr == td:
+        raise RangeError(f"tr and td are both {tr:g}; give a td after tr")
     if not tr < td:
         raise RangeError(
             f"tr {tr:g} is not before td {td:g}; give the earlier time as tr"
@@ -641,7 +657,7 @@ def _find_saving_pair(situation: Situation) -> Pair | None:
 
 def _examine_anew(situation: Situation, td: float) -> Situation:
     """Examine the same record at another td in the same way as at a td given by the user."""
-    # The oscillator is fitted again, but the slow search for the reason of its refusal is skipped.
+    # The oscillator is fitted again, but the slow search for the reason for its rejection is skipped.
     quick = situation.evidence.span is None
     return examine_td(situation.history, td, situation.settings, quick=quick)
 
@@ -724,11 +740,11 @@ def suggest_in_run(
         answer = suggest_at(situation, with_better=with_better)
         if with_better:
             answer = _add_choice_in_flight(answer)
-    _refuse_switched(reference, answer.situation)
+    refuse_switched_flight(reference, answer.situation)
     return _add_health(answer, reference.run)
 
 
-def _refuse_switched(reference: Reference, situation: Situation) -> None:
+def refuse_switched_flight(reference: Reference, situation: Situation) -> None:
     """Raise RangeError if the parts, or some of them, were rigid in the flight up to td."""
     # Imported here to keep start-up fast.
     from d2rpick.choice.switched.frozen import refuse_switched
@@ -768,7 +784,7 @@ def verify_run(
     """Judge one pair (tr, td) of a reference run; see `verify_in_history` for ``earlier`` and the errors raised."""
     refuse_unsound(reference.history, settings, td, choosing=False)
     verdict = verify_in_history(reference.history, tr, td, settings, earlier)
-    _refuse_switched(reference, verdict.situation)
+    refuse_switched_flight(reference, verdict.situation)
     return _add_health(verdict, reference.run)
 
 

@@ -76,7 +76,7 @@ class Limit(NamedTuple):
 class Use(NamedTuple):
     """Commands and answers that use an option of a choice, and the limit that the option sets.
 
-    ``limit`` is the quantity that the value of the option limits; None if the option is not a limit. If ``of_cards`` is
+    ``limit`` is the `Limit` that the value of the option sets; None if the option is not a limit. If ``of_cards`` is
     True, ``card`` and ``check --history`` also have the option, and if ``of_sets`` is True, ``parts`` and ``study``
     also have it. If ``is_advanced`` is True, the last section of the help lists the option.
     """
@@ -97,8 +97,8 @@ def _describe_use(**use: Any) -> dict[str, Use]:
 class ChoiceOptions:
     """The options that define how a pair is chosen and judged; times have the unit of the history.
 
-    An option that limits recommendations has a ``limit``. Suggest, verify, explore, plan, study and check then refuse
-    each pair that exceeds the limit, state this, and exclude such pairs from the windows.
+    An option that limits recommendations has a ``limit``. Suggest, verify, explore, plan, study, check and card
+    then refuse each pair that exceeds the limit, state this, and exclude such pairs from the windows.
     """
 
     after: float | None = make_option(

@@ -11,6 +11,7 @@ import numpy as np
 
 from d2rpick.base.errors import (
     Caution,
+    EnergyChoiceError,
     FormatError,
     RangeError,
     give_if_written,
@@ -26,6 +27,7 @@ from d2rpick.choice.health import (
     warn_about_health,
 )
 from d2rpick.choice.pair.grades import DO_NOT_USE, USE, USE_WITH_CARE
+from d2rpick.choice.pair.situation import FEWEST_STATES
 from d2rpick.choice.question import Reference, Settings
 from d2rpick.choice.switched.frozen import find_frozen_times
 from d2rpick.choice.switched.switched_run import (
@@ -52,8 +54,6 @@ if TYPE_CHECKING:
     from d2rpick.histories.run import OpenedRun
 
 
-# Smallest number of states from which times can be chosen.
-_FEWEST: Final = 3
 # Name of the Radioss output that contains the part momenta.
 _RADIOSS: Final = "/TH/PART with DEF, MASS and HE for all parts"
 _LS_DYNA: Final = "*DATABASE_MATSUM"
@@ -89,10 +89,11 @@ class Overview(NamedTuple):
     chosen among several columns.  ``flights`` are the free flights of the requested parts, or of all, each with its
     source: ``plan`` and ``suggest`` choose from them; they rest on the energy alone if nothing better is written.
     ``health`` is that of the run, with the longest flight as its window; None if there are no energies.  ``unjudged``
-    states why no times can be chosen from the run; empty if they can.  ``should_write`` names the output that would
-    show the flights of single parts; None if it is written, or there is no state.  ``deck`` is the main deck of the run
-    that was used, and ``selection`` the columns and parts that the user chose.  ``rigid`` are the windows in which
-    parts are rigid.  ``never_flies`` is True if the momentum shows no flight at any time.
+    states why no times can be chosen from the run; empty if they can.  ``energies`` are the numbers of the columns of
+    which the user has to choose one before the run can be judged; empty if the energy is known.  ``should_write`` names
+    the output that would show the flights of single parts; None if it is written, or there is no state.  ``deck`` is
+    the main deck of the run that was used, and ``selection`` the columns and parts that the user chose.  ``rigid`` are
+    the windows in which parts are rigid.  ``never_flies`` is True if the momentum shows no flight at any time.
     """
 
     source: tuple[str, ...]
@@ -118,6 +119,7 @@ class Overview(NamedTuple):
     selection: Selection = Selection()
     rigid: tuple[Times, ...] = ()
     never_flies: bool = False
+    energies: tuple[str, ...] = ()
 
     @property
     def verdict(self) -> str:
@@ -131,9 +133,9 @@ class Overview(NamedTuple):
         """Reason for the verdict."""
         if self.unjudged:
             return "; ".join(caution.message for caution in self.unjudged)
-        if not self.flights and self.states is not None and self.states < _FEWEST:
+        if not self.flights and self.states is not None and self.states < FEWEST_STATES:
             states = f"{self.states} state{'s' * (self.states != 1)}"
-            return f"the files contain {states}, at least {_FEWEST} were expected"
+            return f"the files contain {states}, at least {FEWEST_STATES} were expected"
         if not self.flights and not self.complete:
             return "the files end within a state, and no free flight is found in the part that was read"
         if not self.flights:
@@ -226,6 +228,7 @@ def describe_run(
     history = _read_history(run, selection)
     rigid: tuple[Times, ...] = ()
     flights: tuple[tuple[str, FreeFlight], ...] = ()
+    energies: tuple[str, ...] = ()
     if history:
         flaws = tuple(list_flaws(history))
         rigid = find_rigid_times(Reference(run, history))
@@ -235,7 +238,7 @@ def describe_run(
         )
         flaws += tuple(_warn_about_flights_outside(history, flights))
     else:
-        flaws = tuple(_warn_about_missing_energy(run, selection))
+        flaws, energies = _explain_missing_energy(run, selection)
     channels = dict.fromkeys(chain.from_iterable(d.channels for d in run.databases))
     should_write = None
     if states != 0 and not any(momenta.parts for momenta in run.momenta(None, None)):
@@ -272,6 +275,7 @@ def describe_run(
         selection=selection,
         rigid=rigid,
         never_flies=history is not None and denies_every_flight(history),
+        energies=energies,
     )
 
 
@@ -446,14 +450,17 @@ def _read_history(run: OpenedRun, selection: Selection) -> History | None:
     return give_if_written(lambda: run.history(selection))
 
 
-def _warn_about_missing_energy(
+def _explain_missing_energy(
     run: OpenedRun, selection: Selection
-) -> Iterator[Caution]:
-    """Yield a warning if the user has to choose an internal energy, or if there is none."""
+) -> tuple[tuple[Caution, ...], tuple[str, ...]]:
+    """Return a warning if no internal energy can be read, and the columns of which the user has to choose one."""
     try:
         run.history(selection)
+    except EnergyChoiceError as error:
+        return (Caution("no-energy", str(error)),), error.columns
     except FormatError as error:
-        yield Caution("no-energy", str(error))
+        return (Caution("no-energy", str(error)),), ()
+    return (), ()
 
 
 def _warn_about_flights_outside(

@@ -52,6 +52,8 @@ COULD_NOT_RUN: Final = 2
 BROKEN_PIPE: Final = 141  # Exit code that a shell reports if SIGPIPE ended the program.
 _Made = TypeVar("_Made", bound=click.Command)
 _LIBRARIES: Final = ("click", "numpy", "scipy", "pandas", "h5py", "matplotlib")
+# Options of a pair of times.
+_TIMES: Final = ("--tr", "--td")
 # Largest difference in similarity between the best match for a mistyped option and others that are suggested [-].
 _LESS_ALIKE: Final = 0.1
 _VERSIONS: Final = (
@@ -194,6 +196,8 @@ class _CommandGroup(Documented, click.Group):
 
 def _format_usage_error(error: click.UsageError) -> str:
     """Return the message of a usage error; for an unknown option, it suggests the options that resemble it most."""
+    if isinstance(error, click.BadOptionUsage) and "requires an argument" in str(error):
+        return _ask_for_value(error)
     if not isinstance(error, click.NoSuchOption):
         return error.format_message()
     problem = error.message.rstrip(".")
@@ -205,6 +209,8 @@ def _format_usage_error(error: click.UsageError) -> str:
         return f"{problem}. Give the {word} by its name alone, without an option"
     if not error.possibilities:
         return error.format_message()
+    if error.ctx and error.ctx.command.name == "check" and error.option_name in _TIMES:
+        return f"{problem}. The times are those of the deck; d2rpick verify judges other times"
     if error.option_name == "--tr":
         return f"{problem}. d2rpick verify judges a given tr with its td"
     import difflib
@@ -217,6 +223,16 @@ def _format_usage_error(error: click.UsageError) -> str:
     nearest = [name for name in likeness if likeness[name] >= best - _LESS_ALIKE]
     names = " or ".join(map(repr, sorted(nearest, key=lambda name: -likeness[name])))
     return f"{problem}. Did you mean {names}?"
+
+
+def _ask_for_value(error: click.BadOptionUsage) -> str:
+    """Return the message on an option without its value, with what the option means."""
+    parameters = error.ctx.command.params if error.ctx else []
+    for option in parameters:
+        if isinstance(option, click.Option) and error.option_name in option.opts:
+            meaning = (option.help or "").partition(".")[0]
+            return f"{error.option_name} needs a value: {meaning}"
+    return error.format_message()
 
 
 def _is_interrupt(error: BaseException | None) -> bool:

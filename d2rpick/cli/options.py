@@ -102,7 +102,12 @@ class Command(Documented):
             )
             super().parse_args(without, list(args))
             ctx.default_map = read_settings(ctx, without, table, source)
-        remaining = super().parse_args(ctx, args)
+        try:
+            remaining = super().parse_args(ctx, args)
+        except click.BadOptionUsage as error:
+            # click omits the context, without which the message cannot say what the option means.
+            error.ctx = error.ctx or ctx
+            raise
         if words := list_words(ctx):
             ctx.meta["d2rpick.command"] = insert_options(
                 ctx.meta["d2rpick.command"], words

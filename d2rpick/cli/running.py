@@ -218,7 +218,10 @@ def follow(
             ),
             nl=False,
         )
-    output.finish(objection=failed or (seconds is not None and since is None))
+    is_on_ground = seconds is not None and since is None
+    if is_on_ground and not failed and not output.exit_zero:
+        tell("d2rpick: exit code 1: the parts do not fly at the last state")
+    output.finish(objection=failed or is_on_ground)
 
 
 @options.make_command

@@ -114,11 +114,12 @@ def study(
     )
     ledger = Ledger(resume, question) if resume is not None else None
     mark = compute_fingerprint(question)
-    rows = []
-    by_line = output.output_format == "ndjson"
-    streaming = by_line and output.file is None
-    quiet = output.quiet or (streaming and sys.stdout.isatty())
+    is_by_row = output.output_format == "ndjson"
+    # Rows for standard output are printed as soon as they are known, those for a file at the end.
+    is_streamed = is_by_row and output.file is None
+    quiet = output.quiet or (is_streamed and sys.stdout.isatty())
     calls = len(sources) - _count_known(ledger, sources, quiet=output.quiet)
+    rows = []
     with (
         _choose_farm(jobs, scheduler, calls, quiet=output.quiet) as farm,
         show_counting(len(sources), quiet=quiet) as count,
@@ -127,30 +128,16 @@ def study(
             question, sources, farm, ledger, absolute=bool(scheduler), told=count.tell
         ):
             rows.append(row)
-            if streaming:
+            if is_streamed:
                 output.result(write_row(row, mark))
+    lines = []
+    if is_by_row and not is_streamed:
+        lines = [write_row(row, mark) for row in rows]
     answer = answer_study(request, question, sources, rows)
     output.notes((), answer.cautions)
     output.spare(dict.fromkeys(stamp.name for row in rows for stamp in row.files))
-    repeated = request.repeat()._replace(
-        times=options.write_times(td=td, td_window=td_window), files=sources
-    )
-
-    def write_page() -> str:
-        from d2rpick.report.pages import (
-            study_page,  # Imported here to keep start-up fast.
-        )
-
-        return study_page(answer, options.repeat_command(), repeated)
-
-    output.beside_answer(answer, write_page)
-    output.answer(
-        answer,
-        lines=[write_row(row, mark) for row in rows]
-        if by_line and not streaming
-        else [],
-        question=repeated,
-    )
+    output.beside_answer(answer, lambda: answer.page(options.repeat_command()))
+    output.answer(answer, lines=lines, question=answer.question)
     _finish_study(answer, output)
 
 

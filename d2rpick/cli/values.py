@@ -87,6 +87,27 @@ class NumberType(FloatType):
         return number
 
 
+class WholeNumber(click.IntRange):
+    """A whole number within its limits."""
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> int:
+        """Read a whole number; the error message contains the value found and the allowed values."""
+        least, most = self.min, self.max
+        limits = f"of at least {least}" if most is None else f"from {least} to {most}"
+        try:
+            number = int(value)
+        except ValueError:
+            number = None
+        is_within = number is not None and (least or 0) <= number
+        if number is None or not is_within or (most is not None and number > most):
+            self.fail(
+                f"{value} was found, a whole number {limits} was expected", param, ctx
+            )
+        return number
+
+
 class File(click.types.StringParamType):
     """Name of a file or folder, completed by the shell."""
 
@@ -255,7 +276,7 @@ def choose_click_type(kind: Number | range | tuple[str, ...] | str) -> Any:
     if isinstance(kind, str):
         return _NAMED[kind]
     if isinstance(kind, range):
-        return click.IntRange(
+        return WholeNumber(
             kind.start, None if kind.stop >= UNLIMITED else kind.stop - 1
         )
     return NumberType(kind) if isinstance(kind, Number) else click.Choice(kind)
@@ -272,7 +293,7 @@ def read_settings(
     Raises
     ------
     ConfigurationError
-        For a key that is no option, or a value that its option does not allow.
+        For a key that is not an option, or a value that its option does not allow.
     """
     values = {
         option: _read_value(ctx, option, value, position)
@@ -400,7 +421,7 @@ def is_used(
     given_values: Mapping[str, Any],
     all_values: Mapping[Any, Any],
 ) -> bool:
-    """Return True if a setting applies, given the options with ``given_values`` and all options in ``all_values``."""
+    """Return True if an option applies to the options of the user (``given_values``) and of all (``all_values``)."""
     if any(name in given_values for name in getattr(option, "instead_of", ())):
         return False
     if option.name in CARDS and (

@@ -144,7 +144,7 @@ def _has_parts(path: str) -> bool:
         from d2rpick.deck.ls_dyna_parts import read_parts
         from d2rpick.deck.reader import read_deck
 
-        return bool(read_parts(read_deck(path)).materials)
+        return bool(read_parts(read_deck(path)).material_by_part)
     except DeckError:
         return True  # The error is reported when the deck is read.
 

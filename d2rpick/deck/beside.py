@@ -9,6 +9,9 @@ from typing import TYPE_CHECKING, Final
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+# Placeholders in a command for the ids of parts, and for main nodes of rigid bodies, that no file names.
+SOME_PARTS: Final = "IDS"
+SOME_NODES: Final = "NODES"
 _LS_DYNA_DECKS: Final = (".k", ".key", ".dyn")
 # Histories in the order of preference: part energies before energies of the model.
 _LS_DYNA_HISTORIES: Final = ("matsum", "binout", "binout0000", "d3plot", "glstat")
@@ -38,6 +41,19 @@ def find_deck_beside(history: Sequence[str]) -> str | None:
         stem = name.partition(".")[0]
         wanted = [f"{stem}{ending}" for ending in _LS_DYNA_DECKS]
     return _find_file(folder, wanted)
+
+
+def find_run_name(history: Sequence[str]) -> str | None:
+    """Return the name of a Radioss run from the name of its history; None if the name is not that of a T01 file.
+
+    Examples
+    --------
+    >>> find_run_name(["run/CLIPT01.gz"]), find_run_name(["sample_data/energy.csv"])
+    ('CLIP', None)
+    """
+    name = os.path.basename(history[0]).removesuffix(".gz") if history else ""  # noqa: PTH119  pathlib would slow down start-up
+    match = re.fullmatch(_RADIOSS_HISTORY, name)
+    return match[1] if match else None
 
 
 def find_history_beside(deck: str) -> str | None:

@@ -145,8 +145,11 @@ def _print_radioss_cards(first_run: FirstRunDeck) -> PrintedCard:
     run = read_run(path)
     bodies = find_bodies(path, first_run.parts)
     if run.starter is None or len(run.legs) != 1:
+        count = len(run.legs)
+        found = f"{count} engine files" if run.starter else "no starter deck"
         raise DeckError(
-            f"{path}: the run has {len(run.legs)} engine files; its starter deck and one were expected"
+            f"{path}: the run has {found}, a starter deck and 1 engine file were expected; give the deck of a run "
+            "without restart segments, in a folder of its own"
         )
     for load in run.starter.named(*_LOADS):
         raise DeckError(f"{load.at}: /{load.name} {_UNSEEN}")

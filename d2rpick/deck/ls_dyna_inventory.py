@@ -163,7 +163,10 @@ def read_ls_dyna_inventory(deck: Deck) -> Inventory:
         ids,
         coordinates,
     )
-    notes = (*_list_notes(deck, cards), *mesh.doubts(parts.materials.keys(), "*"))
+    notes = (
+        *_list_notes(deck, cards),
+        *mesh.doubts(parts.material_by_part.keys(), "*"),
+    )
     joints = ls_dyna_loads.read_joints(deck)
     local_nodes = _read_watched_nodes(deck, local=True)
     watched_nodes = np.union1d(_read_watched_nodes(deck, local=False), local_nodes)
@@ -438,7 +441,7 @@ def _build_parts(deck: Deck, parts: DeckParts, mesh: Mesh) -> dict[int, PartData
     materials = dict(_read_materials(deck, parts))
     unswitchable = find_unswitchable_in_ls_dyna(deck, parts)
     part_data: dict[int, PartData] = {}
-    for part, name in parts.materials.items():
+    for part, name in parts.material_by_part.items():
         material = materials.get(name)
         section = _build_section(
             sections.get(parts.sections.get(part, 0)), kinds.get(part, set()), material

@@ -231,7 +231,9 @@ def _read_material_supports(deck: Deck, parts: DeckParts) -> Iterator[Hold]:
             card.integer(row, RIGID_MATERIAL["CON2"]).value
         )
         rigid_parts = frozenset(
-            part for part, material in parts.materials.items() if material == name
+            part
+            for part, material in parts.material_by_part.items()
+            if material == name
         )
         if rigid_parts and (axes or along_own_axes):
             yield Hold(

@@ -150,12 +150,13 @@ class DeckPartSet(NamedTuple):
 class DeckParts:
     """Data of each part, and part sets, by id; None stands for a kind of set that cannot be read.
 
+    ``material_by_part`` contains the material (MID) that each *PART names; the material itself need not be in the deck.
     ``all_known`` is False if an include was not read, a block is encrypted, or a keyword creates parts in a way that
     cannot be read; the deck may then have further parts. ``problems`` contains unreadable ids of parts and sets, and
     unreadable numbers of includes.
     """
 
-    materials: dict[int, str] = field(default_factory=dict)
+    material_by_part: dict[int, str] = field(default_factory=dict)
     titles: dict[int, str] = field(default_factory=dict)
     sections: dict[int, int] = field(default_factory=dict)
     sets: dict[int, DeckPartSet | None] = field(default_factory=dict)
@@ -165,7 +166,10 @@ class DeckParts:
 
     def is_rigid(self, part: int) -> bool:
         """Return True if the material of the part is a *MAT_RIGID."""
-        return part in self.materials and self.materials[part] in self.rigid_materials
+        return (
+            part in self.material_by_part
+            and self.material_by_part[part] in self.rigid_materials
+        )
 
     def members(self, set_id: int) -> tuple[int, ...] | None:
         """Return the parts of a part set in ascending order; None if they are unknown."""
@@ -175,14 +179,14 @@ class DeckParts:
             if (
                 content is None
                 or content.problems
-                or (content.ranges and not self.materials)
+                or (content.ranges and not self.material_by_part)
             ):
                 return None
             part_ids.update(content.parts)
             part_ids.update(
                 part
                 for low, high in content.ranges
-                for part in self.materials
+                for part in self.material_by_part
                 if low <= part <= high
             )
         return tuple(sorted(part_ids))
@@ -276,7 +280,10 @@ def _add_part(
         parts.problems.append((part.field, part.problem))
     elif part.value > 0:
         number = part.value + card.transform.part
-        parts.materials[number], parts.titles[number] = material, title.text.strip()
+        parts.material_by_part[number], parts.titles[number] = (
+            material,
+            title.text.strip(),
+        )
         if material and not section.problem and section.value:
             parts.sections[number] = section.value + card.transform.rest
 
@@ -421,7 +428,7 @@ def _read_card_sections(card: Card) -> Iterator[tuple[int, SectionCard]]:
 
 
 def find_element_cards(deck: Deck, *, searched: bool) -> list[Card]:
-    """Return the element cards that may define shared nodes or, if ``searched`` is False, the other element cards."""
+    """Return the element cards in which the nodes of constraints are searched for; the others if not ``searched``."""
     cards = deck.named(*_SEARCHED)
     return [
         card

@@ -189,6 +189,8 @@ def refuse_overlapping_windows(windows: Sequence[Times]) -> tuple[Times, ...]:
     if not windows:
         raise DeckError("no window was given, expected at least one tr and td")
     for tr, td in windows:
+        if tr == td:
+            raise DeckError(f"tr and td are both {tr:g}; give a td after tr")
         if not 0 <= tr < td < math.inf:
             raise DeckError(
                 f"tr is {tr:g} and td is {td:g}, 0 <= tr < td was expected; give the earlier time as tr"

@@ -319,7 +319,7 @@ def read_deck(path: str, content: bytes | SourceFile | None = None) -> Deck:
             problem = "only *END was found, no keyword before it"
             expected = "*KEYWORD and the cards"
         else:
-            problem = "no keyword was found"
+            problem = main.describe_lack_of_keywords()
             expected = "an LS-DYNA deck (lines that begin with *) or a file of a Radioss run (/BEGIN, /RUN)"
         raise DeckError(
             f"{path}: {problem}; {expected} {'were' if main.marks else 'was'} expected; give the main deck of the run"

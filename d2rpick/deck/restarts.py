@@ -36,7 +36,7 @@ def is_restart(path: str) -> bool:
         deck = read_deck(path)
     except (DeckError, OSError):
         return False  # The deck check reports the error.
-    return bool(deck.named(_KEYWORD)) and not read_parts(deck).materials
+    return bool(deck.named(_KEYWORD)) and not read_parts(deck).material_by_part
 
 
 def join_restarts(main: Deck, restarts: Sequence[str]) -> Deck:

@@ -226,6 +226,13 @@ class SourceFile:
             )
         return find_marks(self._file)
 
+    def describe_lack_of_keywords(self) -> str:
+        """Return why a file has no keyword."""
+        head = self.read(0, _HEAD)
+        if not head.strip():
+            return "the file is empty"
+        return "binary data was found" if b"\0" in head else "no keyword was found"
+
     def blocks(self) -> Iterator[Block]:
         """Yield keyword blocks and encrypted blocks in file order, up to ``*END``."""
         for start, end in zip_longest(self.marks, islice(self.marks, 1, None)):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final, NamedTuple
 
+from d2rpick.base.errors import DeckError
 from d2rpick.deck.ls_dyna_parts import (
     DELETING_FLAGS,
     Constraint,
@@ -73,6 +74,16 @@ def find_name_of_files(run: RadiossRun) -> str | None:
     return run.legs[0].name if run.legs else None
 
 
+def list_main_nodes(path: str) -> tuple[int, ...]:
+    """Return the main nodes of all rigid bodies of a Radioss deck; empty if the deck cannot be read."""
+    try:
+        run = read_run(path)
+    except DeckError:
+        return ()
+    bodies = run.starter.bodies if run.starter else ()
+    return tuple(dict.fromkeys(body.node.value for body in bodies if body.node.value))
+
+
 def _find_free_ids(deck: Deck) -> tuple[int, int]:
     """Return two ids above those of all switch sets and part sets of the deck."""
     sets = (
@@ -101,7 +112,7 @@ def _is_on_parts(
     from d2rpick.deck.ls_dyna_inventory import find_first_parts
 
     cards = find_element_cards(deck, searched=True)
-    other_parts = read_parts(deck).materials.keys() - set(parts)
+    other_parts = read_parts(deck).material_by_part.keys() - set(parts)
     nodes_on_parts = find_first_parts(cards, parts)
     nodes_elsewhere = find_first_parts(cards, other_parts)
     return all(

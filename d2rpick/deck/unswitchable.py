@@ -74,7 +74,7 @@ def find_unswitchable_in_ls_dyna(
         if card.data
     }
     reasons: dict[int, Unswitchable] = {}
-    for part, material in parts.materials.items():
+    for part, material in parts.material_by_part.items():
         section = sections.get(parts.sections.get(part, 0))
         law = laws.get(material, "").removesuffix("_TITLE")
         if section and section.kind == "SOLID" and section.elform in _FLOWING:

@@ -121,7 +121,7 @@ def write_deck(
             write_as_a_whole(target / name, content)
     except OSError as error:
         raise DeckError(
-            f"{error.filename or folder}: cannot be written ({error.strerror})"
+            f"{error.filename or folder}: cannot be written ({error.strerror}); choose another folder"
         ) from None
     return [str(target / name) for name in files]
 
@@ -246,9 +246,13 @@ def _write_radioss(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
 def _require_starter(main: str, run: RadiossRun) -> Starter:
     """Return the starter deck of a run; raise DeckError if the run has no starter deck or no engine file."""
     if run.starter is None or not run.legs:
-        missing = "starter deck" if run.starter is None else "engine file"
+        if run.starter is None:
+            missing, name = "starter deck", "NAME_0000.rad"
+        else:
+            missing, name = "engine file", "NAME_0001.rad"
         raise DeckError(
-            f"{main}: the run has no {missing}, expected a starter deck and an engine file"
+            f"{main}: the run has no {missing}, expected a starter deck and an engine file; put the {missing} of the "
+            f"run, {name}, into the folder of the other file"
         )
     return run.starter
 
@@ -284,7 +288,7 @@ def _keep_bodies_off(
 
 
 def _read_repeated_blocks(leg: RadiossLeg, printed_leg: RadiossLeg) -> bytes:
-    """Return those blocks of an engine file that are repeated in a printed engine run."""
+    """Return the blocks of an engine file that must be repeated in the printed engine file ``printed_leg``."""
     return b"".join(
         read_block(block)
         for block in read_blocks(leg.run.block.source)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from math import ceil
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -76,15 +77,16 @@ def find_frame_of_nodes(
     The result is None if the orientation is unknown or if the motion is not written at all these times.
     """
     coordinates = placement.find_watched_nodes(parts)
-    spread_ids = list(coordinates)[:: -(-len(coordinates) // _MOST_NODES) or 1]
+    stride = max(1, ceil(len(coordinates) / _MOST_NODES))
+    spread_ids = list(coordinates)[::stride]
     motion = displacements(spread_ids)
     if motion is None or not _is_within(time, motion.time):
         return None
     deck = np.stack([coordinates[id_] for id_ in motion.ids])
-    moved = motion.displacements.reshape(motion.time.size, -1)
-    at_times = [np.interp(time, motion.time, column) for column in moved.T]
-    where = deck + np.stack(at_times, axis=1).reshape(time.size, -1, 3)
-    return fit_frame(deck, where, np.ones(len(deck)))
+    columns = motion.displacements.reshape(motion.time.size, -1)
+    at_times = [np.interp(time, motion.time, column) for column in columns.T]
+    moved = np.stack(at_times, axis=1).reshape(time.size, -1, 3)
+    return fit_frame(deck, deck + moved, np.ones(len(deck)))
 
 
 def _is_within(wanted: Samples, written: Samples) -> bool:
@@ -119,24 +121,23 @@ def _estimate_doubt(shape: Samples, bent: Samples, mass: Samples) -> float:
     rigid shape by ``bent`` (n, parts, 3). Two parts on a line do not determine an angle; the result is then 0.
     """
     count = mass.size
-    alone = mass * mass.sum() / (mass.sum() - mass)
-    other_inertia = compute_second_moments(shape[np.newaxis], mass) - np.einsum(
-        "p,pi,pj->pij", alone, shape, shape
-    )
-    light = np.linalg.pinv(
-        compute_inertia(other_inertia), rcond=_ALONG_LINE, hermitian=True
-    )
-    turned = np.einsum(
-        "pij,npj->npi", light, alone[:, np.newaxis] * np.cross(shape, bent)
-    )
-    return float(np.sqrt(2 * (count - 1) / count * turned.var(axis=0).sum()))
+    # Without a part, the common centre moves away from it, which raises its term by the factor 1/(1 - m/M).
+    raised_mass = mass * mass.sum() / (mass.sum() - mass)
+    of_all = compute_second_moments(shape[np.newaxis], mass)
+    of_part = np.einsum("p,pi,pj->pij", raised_mass, shape, shape)
+    inertia_of_others = compute_inertia(of_all - of_part)
+    inverse = np.linalg.pinv(inertia_of_others, rcond=_ALONG_LINE, hermitian=True)
+    moment = raised_mass[:, np.newaxis] * np.cross(shape, bent)
+    # Rotation of the frame at each time if one of the parts is omitted, shape (n, parts, 3).
+    turned = np.einsum("pij,npj->npi", inverse, moment)
+    variance = turned.var(axis=0).sum()
+    return float(np.sqrt(2 * (count - 1) / count * variance))
 
 
 def _fit_orientations(shape: Samples, where: Samples, mass: Samples) -> Samples:
     """Return the rotations (n, 3, 3) that best map a shape (parts, 3) to the positions ``where`` (n, parts, 3)."""
-    left_vectors, _, right_vectors = np.linalg.svd(
-        np.einsum("p,npi,pj->nij", mass, where, shape)
-    )
+    covariance = np.einsum("p,npi,pj->nij", mass, where, shape)
+    left_vectors, _, right_vectors = np.linalg.svd(covariance)
     mirrored = np.linalg.det(left_vectors @ right_vectors) < 0
     left_vectors[mirrored, :, 2] *= -1
     return np.asarray(left_vectors @ right_vectors)
@@ -163,7 +164,5 @@ def compute_second_moments(places: Samples, mass: Samples) -> Samples:
 
 def compute_inertia(second: Samples) -> Samples:
     """Return the inertia tensor computed from the second moments (..., 3, 3)."""
-    return np.asarray(
-        np.trace(second, axis1=-2, axis2=-1)[..., np.newaxis, np.newaxis] * np.eye(3)
-        - second
-    )
+    trace = np.trace(second, axis1=-2, axis2=-1)
+    return np.asarray(trace[..., np.newaxis, np.newaxis] * np.eye(3) - second)

@@ -142,7 +142,7 @@ def _make_seen_flight(
 
 
 def _make_described_flight(history: History, described: Described) -> Flight:
-    """Return the window that an oscillator or modes describe as a flight, unless a load does work in this window."""
+    """Return as a flight the window in which an oscillator or modes fit, unless a load does work in this window."""
     refusal = _explain_why_fed(history, described.start, described.end)
     if refusal:
         return Flight(refusal=refusal)

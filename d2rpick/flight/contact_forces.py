@@ -78,16 +78,15 @@ class Touches(NamedTuple):
             return None
         acting = np.flatnonzero(self.acts)
         next_contact = int(np.searchsorted(acting, next_state))
-        first = int(acting[next_contact - 1]) if next_contact else 0
-        last = (
-            int(acting[next_contact]) - 1
-            if next_contact < acting.size
-            else time.size - 1
-        )
-        long_enough = float(time[last] - time[first]) >= SHORTEST * float(
-            time[-1] - time[0]
-        )
-        if last - first + 1 < FEWEST or not long_enough:
+        first = 0
+        last = time.size - 1
+        if next_contact > 0:
+            first = int(acting[next_contact - 1])
+        if next_contact < acting.size:
+            last = int(acting[next_contact]) - 1
+        duration = float(time[last] - time[first])
+        least_duration = SHORTEST * float(time[-1] - time[0])
+        if last - first + 1 < FEWEST or duration < least_duration:
             return None
         return FreeFlight.of(time, (first, last), gravity=float("nan"))
 
@@ -106,22 +105,15 @@ def _select_outer_forces(
         return list(forces)
     steps = np.diff(whole.time)
     changes = np.diff(whole.of(range(whole.values.shape[1])), axis=0).ravel()
+    by_forces = [
+        _sum_impulses_between(force, whole.time).ravel() for force in complete_forces
+    ]
     by_gravity = [np.outer(steps, axis).ravel() for axis in np.eye(3)]
-    columns = np.stack(
-        [
-            *(
-                _sum_impulses_between(force, whole.time).ravel()
-                for force in complete_forces
-            ),
-            *by_gravity,
-        ],
-        axis=1,
-    )
+    columns = np.stack([*by_forces, *by_gravity], axis=1)
     sizes = np.linalg.norm(columns, axis=0)
     sizes[sizes == 0] = 1.0
-    shares = np.abs(np.linalg.lstsq(columns / sizes, changes, rcond=None)[0] / sizes)[
-        : len(complete_forces)
-    ]
+    factors = np.linalg.lstsq(columns / sizes, changes, rcond=None)[0] / sizes
+    shares = np.abs(factors)[: len(complete_forces)]
     whole_share = float(shares.max()) if whole.velocity else 1.0
     inner = {
         id(force)
@@ -134,9 +126,8 @@ def _select_outer_forces(
 def _sum_impulses_between(force: ContactForce, time: Samples) -> Samples:
     """Return the impulses of a force between successive times (m,), shape (m - 1, 3)."""
     sums = np.cumsum(force.impulses, axis=0)
-    return np.diff(
-        np.stack([np.interp(time, force.time, axis) for axis in sums.T], axis=1), axis=0
-    )
+    sums_at_times = [np.interp(time, force.time, axis) for axis in sums.T]
+    return np.diff(np.stack(sums_at_times, axis=1), axis=0)
 
 
 def is_deformed(history: History, flight: FreeFlight) -> bool:
@@ -144,9 +135,10 @@ def is_deformed(history: History, flight: FreeFlight) -> bool:
 
     In a flight, the energy oscillates about its level or falls because of damping.
     """
-    energy = history.between(flight.start, flight.end)[1]
+    _, energy = history.between(flight.start, flight.end)
     pieces = np.array_split(energy, _PIECES)
     means = np.array([piece.mean() for piece in pieces if piece.size])
-    rise = means - np.minimum.accumulate(means)
+    rises = means - np.minimum.accumulate(means)
+    largest_rise = float(rises.max(initial=0.0))
     highest = float(np.abs(history.energy).max())
-    return float(rise.max(initial=0.0)) > _RISE * highest
+    return largest_rise > _RISE * highest

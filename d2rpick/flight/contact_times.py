@@ -65,22 +65,21 @@ def find_contact_times(momenta: Momenta) -> ContactTimes | None:
     last = flight.stop - 1 - _EDGE
     if last - first < _FEWEST:
         return None
-    gravity = (momentum[last] - momentum[first]) / (time[last] - time[first])
-    pushes = np.diff(momentum, axis=0) - gravity * np.diff(time)[:, np.newaxis]
-    sizes = np.linalg.norm(pushes, axis=1)
-    smallest_push = _SEEN * max(
-        2 * momenta.noise(members), float(sizes[first:last].max())
-    )
-    room = np.maximum(
-        smallest_push, _OF_WEIGHT * float(np.linalg.norm(gravity)) * np.diff(time)
-    )
+    steps = np.diff(time)
+    weight = (momentum[last] - momentum[first]) / (time[last] - time[first])
+    impulses = np.diff(momentum, axis=0) - weight * steps[:, np.newaxis]
+    sizes = np.linalg.norm(impulses, axis=1)
+    largest_in_flight = float(sizes[first:last].max())
+    error = _SEEN * max(2 * momenta.noise(members), largest_in_flight)
+    notable_force = _OF_WEIGHT * float(np.linalg.norm(weight))
+    limit = np.maximum(error, notable_force * steps)
     spans = tuple(
         _place_in_intervals(time, part.start, part.stop)
-        for part in find_stretches(sizes > room)
+        for part in find_stretches(sizes > limit)
     )
     mass = momenta.mass(members)
     speed = float(np.linalg.norm(momentum[last])) / mass if mass > 0 else None
-    return ContactTimes(spans, float(np.diff(time).max()), speed)
+    return ContactTimes(spans, float(steps.max()), speed)
 
 
 def narrow_to_states(
@@ -96,10 +95,12 @@ def narrow_to_states(
     >>> narrow_to_states(np.array([0.0, 1.0, 2.0, 3.0]), 0.5, 2.5)
     (1.0, 2.0)
     """
-    states = time[(time >= tr) & (time <= (np.inf if td is None else td))]
-    if states.size < _FEWEST:
+    end = np.inf if td is None else td
+    times = time[(time >= tr) & (time <= end)]
+    if times.size < _FEWEST:
         return tr, td
-    return float(states[0]), None if td is None else float(states[-1])
+    last = None if td is None else float(times[-1])
+    return float(times[0]), last
 
 
 def find_force_times(force: ContactForce, least: float = 0.0) -> ContactTimes | None:
@@ -143,11 +144,13 @@ def _place_in_intervals(time: Samples, first: int, stop: int) -> tuple[float, fl
     start = float(time[first])
     end = float(time[stop])
     longest_delay = _OF_ONE_INTERVAL * (end - start)
-    later = float(time[first + 1] - start) / 2
-    earlier = float(end - time[stop - 1]) / 2
-    begins = start if first == 0 else start + min(later, longest_delay)
-    ends = end if stop == time.size - 1 else end - min(earlier, longest_delay)
-    return begins, ends
+    half_of_first = float(time[first + 1] - start) / 2
+    half_of_last = float(end - time[stop - 1]) / 2
+    if first > 0:
+        start += min(half_of_first, longest_delay)
+    if stop < time.size - 1:
+        end -= min(half_of_last, longest_delay)
+    return start, end
 
 
 def _find_members(momenta: Momenta, parts: object) -> tuple[int, ...]:

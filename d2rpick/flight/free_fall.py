@@ -83,15 +83,16 @@ class Laws:
         time = momenta.time
         momentum = momenta.of(members)
         self.fit = FreeFall(time, momentum)
-        self.noise = momenta.noise(members)
         self.balance = balance
         self.velocity = momenta.velocity
-        self.gravities = momenta.surroundings.gravity_on(
-            momenta.parts and [momenta.parts[i] for i in members]
-        )
+        parts = momenta.parts and [momenta.parts[i] for i in members]
+        self.gravities = momenta.surroundings.gravity_on(parts)
         self.mass = 1.0 if momenta.velocity else momenta.mass(members)
         complete = set(momenta.moving) <= set(members)
         self.extent = float(np.ptp(momentum, axis=0).max())
+        # A state whose time is rounded seems to have the momentum of another time.
+        time_share = momenta.precision.noise(time) / max(float(np.ptp(time)), 1e-300)
+        self.noise = momenta.noise(members) + min(time_share, 1.0) * self.extent
         largest = float(np.linalg.norm(momentum, axis=1).max())
         share = min(1.0, largest / self.extent) if self.extent > 0 else 0.0
         self._enough = _ENOUGH * share if complete else min(TOLERANCE, _ENOUGH * share)
@@ -108,9 +109,8 @@ class Laws:
         if window:
             return (None if self.is_carried else window), None
         window = self._lasting(self._steady, td, self._enough)
-        if (
-            window and not self._falls_across
-        ):  # A contact force that briefly equals the weight keeps the momentum constant, too.
+        # A contact force that briefly equals the weight keeps the momentum constant, too.
+        if window and not self._falls_across:
             return (None if self.is_carried else window), None
         return self._under_gravity(td)
 
@@ -145,15 +145,14 @@ class Laws:
 
     def _braked(self, first: int, last: int) -> bool:
         """Return True if a load, unlike damping, stops the parts completely or within a few states."""
-        largest, final_size = (
-            float(np.abs(self.fit.momentum[slice(at, last + 1)]).max())
-            for at in (0, first)
-        )
+        sizes = np.abs(self.fit.momentum[: last + 1])
+        largest = float(sizes.max())
+        largest_in_window = float(sizes[first:].max())
         length = float(self.fit.time[last] - self.fit.time[first])
         damping = self.fit.damping(first, last)
-        return damping > self.fit.limit_damping(first, last) or (
-            final_size < _LEFT * largest and damping * length > _DAMPED
-        )
+        if damping > self.fit.limit_damping(first, last):
+            return True
+        return largest_in_window < _LEFT * largest and damping * length > _DAMPED
 
     def _under_gravity(self, td: float) -> tuple[tuple[int, int] | None, float | None]:
         """Return the window around ``td`` in which gravity has a usual magnitude. A fading load may still act in it."""
@@ -162,7 +161,7 @@ class Laws:
         first, last = self._around(td)
         if last - first < FEWEST or not self.mass > 0:
             return None, None
-        window_by_gravity = []
+        windows = []
         across = list(self._weights_across(first, last))
         for weight in across or self._weights_near(first, last):
             key = tuple(weight.tolist())
@@ -178,10 +177,9 @@ class Laws:
                     window = None
             if window and self._slowed(window, weight):
                 return None, None
-            window_by_gravity.append(
-                (window, float(np.linalg.norm(weight)) / self.mass)
-            )
-        windows = [(states, gravity) for states, gravity in window_by_gravity if states]
+            if window:
+                gravity = float(np.linalg.norm(weight)) / self.mass
+                windows.append((window, gravity))
         return max(
             windows,
             key=lambda pair: float(np.ptp(time[[*pair[0]]])),
@@ -194,26 +192,32 @@ class Laws:
         return find_longest_window(self.fit, at, TOLERANCE * self.extent + self.noise)
 
     def _weights_across(self, first: int, last: int) -> Iterator[Samples]:
-        """Yield possible weights (3,) along an axis, from the momentum perpendicular to a load of fixed direction."""
+        """Yield possible forces of gravity (3,), each along a coordinate axis, beside a load of fixed direction.
+
+        They explain the momentum perpendicular to this load, which the load does not change.
+        """
         if last - first < FEWEST or not self.mass > 0:
             return
         time = self.fit.time[first : last + 1]
         momentum = self.fit.momentum[first : last + 1]
         deviation = remove_line(time, momentum)
+        # The load acts in the direction in which the momentum deviates most from a line.
         along = np.linalg.svd(deviation, full_matrices=False)[2][0]
         across = np.eye(along.size) - np.outer(along, along)
         room = _REACH_OF_NOISE * max(self.noise, ROUND_OFF * self.extent)
-        if (
-            np.abs(deviation @ across).max() > room
-            or np.abs(deviation @ along).max() < _CLEARLY * room
-        ):
+        if np.abs(deviation @ across).max() > room:
             return
-        slope = across @ np.polyfit(time - time[0], momentum, 1)[0]
-        for axis, seen_part in zip(np.eye(along.size), across, strict=True):
-            if seen_part @ seen_part <= _SEEN**2:
+        if np.abs(deviation @ along).max() < _CLEARLY * room:
+            return
+        force, _ = np.polyfit(time - time[0], momentum, 1)
+        force_across = across @ force
+        # The rows of the projector are the parts of the axes perpendicular to the load.
+        for axis, axis_across in zip(np.eye(along.size), across, strict=True):
+            square = axis_across @ axis_across
+            if square <= _SEEN**2:
                 continue
-            size = float(slope @ seen_part) / float(seen_part @ seen_part)
-            left_over = np.linalg.norm(slope - size * seen_part)
+            size = float(force_across @ axis_across) / float(square)
+            left_over = np.linalg.norm(force_across - size * axis_across)
             is_along_axis = left_over <= _ALIKE * abs(size)
             if is_along_axis and self._is_gravity(abs(size) / self.mass):
                 yield size * axis
@@ -221,20 +225,17 @@ class Laws:
     def _weights_near(self, first: int, last: int) -> Iterator[Samples]:
         """Yield the usual weights (3,) that are close to the mean force between two states."""
         time = self.fit.time[first : last + 1]
-        slope = (
-            np.polyfit(time - time[0], self.fit.momentum[first : last + 1], 1)[0]
-            / self.mass
-        )
-        size = float(np.linalg.norm(slope))
-        if size > 0:
-            if np.abs(slope / size).max() > _ALONG_AXIS:
-                direction = np.round(slope / size)
-            else:
-                direction = slope / size
-            yield from (
-                direction * (self.mass * gravity)
-                for gravity in _list_gravities_near(size, self.gravities)
-            )
+        momentum = self.fit.momentum[first : last + 1]
+        force, _ = np.polyfit(time - time[0], momentum, 1)
+        acceleration = force / self.mass
+        size = float(np.linalg.norm(acceleration))
+        if not size > 0:
+            return
+        direction = acceleration / size
+        if np.abs(direction).max() > _ALONG_AXIS:
+            direction = np.round(direction)
+        for gravity in _list_gravities_near(size, self.gravities):
+            yield direction * (self.mass * gravity)
 
     def _fades_out(self, window: tuple[int, int], weight: Samples) -> bool:
         """Return True if the force in a window minus the ``weight`` (3,) fades and is small at the end."""
@@ -258,25 +259,20 @@ class Laws:
         vector = self.fit.gravity(*window)
         force = float(np.linalg.norm(vector))
         mass = self.mass if self.mass > 0 else float("nan")
-        if force * (end - start) <= _UNSEEN * (TOLERANCE * self.extent + self.noise):
+        impulse = force * (end - start)
+        if impulse <= _UNSEEN * (TOLERANCE * self.extent + self.noise):
             return None if self.is_carried else 0.0
-        if self._is_gravity(
-            force / mass,
-            _ALIKE + _REACH_OF_DIGITS * self.noise / (force * (end - start)),
-        ):
+        error = _ALIKE + _REACH_OF_DIGITS * self.noise / impulse
+        if self._is_gravity(force / mass, error):
             return None if self._slowed(window, vector) else force / mass
-        if (
-            self.velocity
-        ):  # The acceleration follows from the velocity, so the mass is not needed.
+        # The acceleration follows from the velocity, so the mass is not needed.
+        if self.velocity:
             return None
         gravity = None
         if self.balance is not None:
+            momentum_along = self.fit.momentum @ (vector / force)
             gravity = find_acceleration_by_work(
-                self.balance,
-                self.fit.time,
-                self.fit.momentum @ (vector / force),
-                start,
-                end,
+                self.balance, self.fit.time, momentum_along, start, end
             )
         if gravity is None:
             return float("nan") if self._may_fall and np.isnan(mass) else None
@@ -291,30 +287,25 @@ class Laws:
         the internal energy.
         """
         balance = self.balance
-        squares = np.sum(self.fit.momentum**2, axis=1)
-        if (
-            balance is None
-            or balance.kinetic is None
-            or balance.internal is None
-            or self.velocity
-            or not self.mass > 0
-        ):
+        if self.velocity or not self.mass > 0:
             return False
+        if balance is None or balance.kinetic is None or balance.internal is None:
+            return False
+        squares = np.sum(self.fit.momentum**2, axis=1)
         kinetic = np.interp(self.fit.time, balance.time, balance.kinetic)
-        ratios = np.divide(
-            squares, 2 * kinetic, out=np.zeros_like(squares), where=kinetic > 0
-        )
-        best = int(np.argmax(ratios))
-        if self.mass > (1 + LAST_DIGIT) * ratios[best]:
+        # A lower bound of the mass at each state: p^2/(2 T), which is 0 where there is no kinetic energy.
+        lower_bounds = np.zeros_like(squares)
+        np.divide(squares, 2 * kinetic, out=lower_bounds, where=kinetic > 0)
+        best = int(np.argmax(lower_bounds))
+        if self.mass > (1 + LAST_DIGIT) * lower_bounds[best]:
             # The mass exceeds its lower bound by more than rounding, so the solver wrote it.
             return False
-        swing = float(np.ptp(balance.internal[find_window(balance.time, start, end)]))
+        inside = find_window(balance.time, start, end)
+        range_of_internal = float(np.ptp(balance.internal[inside]))
         largest = force / self.mass
-        lightest = largest * (1 - swing / float(kinetic[best]))
-        return any(
-            lightest <= gravity <= largest
-            for gravity in _list_gravities_near(largest, self.gravities)
-        )
+        smallest = largest * (1 - range_of_internal / float(kinetic[best]))
+        gravities = _list_gravities_near(largest, self.gravities)
+        return any(smallest <= gravity <= largest for gravity in gravities)
 
     def _slowed(self, window: tuple[int, int], force: Samples) -> bool:
         """Return True if a constant force (3,) is friction rather than gravity, because it only slows the parts down.
@@ -329,12 +320,12 @@ class Laws:
         forward = momentum @ along
         if self.gravities is not None or (forward >= 0).any():
             return False
-        across = float(
-            np.linalg.norm(momentum - np.outer(forward, along), axis=1).max()
-        )
-        straight = across <= _STRAIGHT * float(np.abs(forward).max())
-        usual = is_gravity(size / self.mass, _ROUGHLY, decades=3)
-        return float(np.abs(along).max()) < _ALONG_AXIS or (straight and not usual)
+        sideways = momentum - np.outer(forward, along)
+        across = float(np.linalg.norm(sideways, axis=1).max())
+        is_straight = across <= _STRAIGHT * float(np.abs(forward).max())
+        has_usual_size = is_gravity(size / self.mass, _ROUGHLY, decades=3)
+        is_along_axis = float(np.abs(along).max()) >= _ALONG_AXIS
+        return not is_along_axis or (is_straight and not has_usual_size)
 
     @property
     def _may_fall(self) -> bool:
@@ -370,14 +361,16 @@ def _list_gravities_near(
 ) -> Iterator[float]:
     """Yield values of gravity close to an acceleration, from the ``known`` values or, by default, the usual ones."""
     if known is not None:
-        yield from (
-            gravity
-            for gravity in known
-            if abs(acceleration - gravity) < _ROUGHLY * gravity
-        )
+        for gravity in known:
+            if abs(acceleration - gravity) < _ROUGHLY * gravity:
+                yield gravity
         return
-    for value in _OF_DECKS if acceleration > 0 else ():
-        gravity = float(value * 10.0 ** np.round(np.log10(acceleration / value)))
+    if not acceleration > 0:
+        return
+    for value in _OF_DECKS:
+        # Other units change the value by a power of ten.
+        exponent = np.round(np.log10(acceleration / value))
+        gravity = float(value * 10.0**exponent)
         if abs(acceleration / gravity - 1) < _ROUGHLY:
             yield gravity
 

@@ -83,12 +83,12 @@ def find_quiet_time(history: History, td: float) -> QuietTime | None:
     states = slice(0, after_td)
     rounding = round_off(history)
     energy_before = history.energy[states]
-    fallen = (
+    is_unloaded = (
         rounding > 0
         and energy_before.size >= FEWEST
         and max(energy_before.max(), -energy_before.min()) <= rounding
     )
-    if fallen and td - start >= SHORTEST * (history.end - start):
+    if is_unloaded and td - start >= SHORTEST * (history.end - start):
         # No load has acted since the start of the record.
         burst = _find_burst(history, states)
         return QuietTime(start, burst, start, td)
@@ -104,16 +104,13 @@ def find_quiet_time(history: History, td: float) -> QuietTime | None:
     if push is not None:
         settled = push
         states = _select_states(history, settled, after_td)
-    changes = [
-        time
-        for time in (
-            _find_burst(history, states),
-            _find_change_of_level(history, states),
-        )
-        if time
-    ]
+    changes = (
+        _find_burst(history, states),
+        _find_change_of_level(history, states),
+    )
+    end = min((time for time in changes if time), default=None)
     start = settled + _WAIT * (td - settled)
-    return QuietTime(start, min(changes, default=None), settled, td)
+    return QuietTime(start, end, settled, td)
 
 
 def _select_states(history: History, start: float, stop: int) -> slice:
@@ -131,23 +128,23 @@ def find_landing_after(history: History, start: float) -> float | None:
     time, energy = history.between(start, np.inf)
     if time.size < FEWEST:
         return None
-    last_known = (
-        np.searchsorted(time, start + _KNOWN * (time - start), side="right") - 1
-    )
+    # Each state is compared with the states in the first part of the time from ``start`` to this state.
+    end_of_known = start + _KNOWN * (time - start)
+    last_known = np.searchsorted(time, end_of_known, side="right") - 1
     top = np.maximum.accumulate(energy)[last_known]
     bottom = np.minimum.accumulate(energy)[last_known]
-    turns = np.searchsorted(history.turns, time[last_known]) - np.searchsorted(
-        history.turns, start
-    )
-    long_enough = (turns >= _TURNED) & (time - start >= SHORTEST * history.duration)
-    beyond = np.flatnonzero(long_enough & (energy > 2 * top - bottom))
+    turns_before = np.searchsorted(history.turns, start)
+    turns = np.searchsorted(history.turns, time[last_known]) - turns_before
+    is_late = time - start >= SHORTEST * history.duration
+    is_beyond = energy > 2 * top - bottom
+    beyond = np.flatnonzero((turns >= _TURNED) & is_late & is_beyond)
     if not beyond.size:
         return None
     first = int(beyond[0])
-    rising = np.flatnonzero(
-        energy[: first + 1] <= top[first] + _BAND_RESERVE * (top[first] - bottom[first])
-    )
-    return float(time[rising[-1] + 1])
+    # The landing begins where the energy last leaves the band of the compared states.
+    top_of_band = top[first] + _BAND_RESERVE * (top[first] - bottom[first])
+    in_band = np.flatnonzero(energy[: first + 1] <= top_of_band)
+    return float(time[in_band[-1] + 1])
 
 
 def find_end_of_load(history: History, td: float) -> float | None:
@@ -188,7 +185,9 @@ def _find_last_excursion(history: History, states: slice) -> float | None:
     usual_range = np.quantile(energy, (_OUTER, 1 - _OUTER))
     low, high = _widen_band(usual_range, 1.0)
     far = np.flatnonzero((energy < low) | (energy > high))
-    return float(history.time[states][far[-1]]) if far.size else None
+    if not far.size:
+        return None
+    return float(history.time[states][far[-1]])
 
 
 def _find_last_push(history: History, states: slice, latest: float) -> float | None:
@@ -200,9 +199,12 @@ def _find_last_push(history: History, states: slice, latest: float) -> float | N
     if time.size < FEWEST:
         return None
     rates = _compute_rates(history)[states.start : states.stop - 1]
-    usual = rates[time[1:] >= latest].max(initial=0.0)
-    fast = np.flatnonzero(rates > _FASTER * usual)
-    return float(time[fast[-1] + 1]) if fast.size else None
+    is_latest = time[1:] >= latest
+    largest_usual = rates[is_latest].max(initial=0.0)
+    fast = np.flatnonzero(rates > _FASTER * largest_usual)
+    if not fast.size:
+        return None
+    return float(time[fast[-1] + 1])
 
 
 @remember
@@ -213,9 +215,12 @@ def _compute_rates(history: History) -> Samples:
 
 def _find_burst(history: History, states: slice) -> float | None:
     """Return the first time [time] after the given states at which the energy exceeds its band; otherwise None."""
-    top = _widen_band(history.energy[states], _BAND_RESERVE)[1]
-    above = np.flatnonzero(history.energy[states.stop :] > top)
-    return float(history.time[states.stop :][above[0]]) if above.size else None
+    _, top = _widen_band(history.energy[states], _BAND_RESERVE)
+    later_energy = history.energy[states.stop :]
+    above = np.flatnonzero(later_energy > top)
+    if not above.size:
+        return None
+    return float(history.time[states.stop + above[0]])
 
 
 def _find_change_of_level(history: History, states: slice) -> float | None:
@@ -261,10 +266,8 @@ def round_off(history: History) -> float:
 
 def find_largest(*terms: Samples | None) -> float:
     """Return the largest absolute energy [energy]. Missing arrays are skipped; if all are missing, return 0."""
-    return max(
-        (float(np.abs(term).max(initial=0.0)) for term in terms if term is not None),
-        default=0.0,
-    )
+    written = [term for term in terms if term is not None]
+    return max((float(np.abs(term).max(initial=0.0)) for term in written), default=0.0)
 
 
 def find_settled_time(
@@ -305,11 +308,8 @@ def find_settled_time(
         is_slow = not driven and _has_slow_swings(*states)
         first_kept = 0 if is_slow else _find_first_kept(*states)
         if first_kept is not None:
-            return (
-                start
-                if first + first_kept == inside.start
-                else float(time[first + first_kept])
-            )
+            settled = first + first_kept
+            return start if settled == inside.start else float(time[settled])
         first += max(1, (last - first) // 4)
     return None
 
@@ -365,9 +365,10 @@ def rises_as_it_yields(
 
 def _sum_later_losses(damped: Samples) -> Samples:
     """Return the energy that damping removes from each state to the last quarter of a window, shape (n,) [energy]."""
-    last = 3 * damped.shape[1] // 4
-    fallen = damped - damped[:, last:].mean(axis=1, keepdims=True)
-    return np.asarray(fallen.max(axis=0, initial=0.0))
+    last_quarter = damped[:, 3 * damped.shape[1] // 4 :]
+    final_level = last_quarter.mean(axis=1, keepdims=True)
+    losses = damped - final_level
+    return np.asarray(losses.max(axis=0, initial=0.0))
 
 
 def _find_first_kept(energy: Samples, lost: Samples, least: float) -> int | None:
@@ -378,20 +379,25 @@ def _find_first_kept(energy: Samples, lost: Samples, least: float) -> int | None
     """
     half = energy.size // 2
     last = 3 * energy.size // 4
-    low = float(energy[last:].min())
-    high = float(energy[last:].max())
+    third_quarter = slice(half, last)
+    last_quarter = energy[last:]
+    low = float(last_quarter.min())
+    high = float(last_quarter.max())
     width = max(high - low, least)
-    drift = float(energy[last:].mean() - energy[half:last].mean())
-    if abs(drift) > _DRIFT * width + (
-        float(lost[half:last].mean()) if drift < 0 else 0.0
-    ):
+    drift = float(last_quarter.mean() - energy[third_quarter].mean())
+    # Energy that damping takes explains a decrease, but not an increase.
+    explained = float(lost[third_quarter].mean()) if drift < 0 else 0.0
+    if abs(drift) > _DRIFT * width + explained:
         return None
-    below = low - _RESERVE * width - np.where(np.isinf(lost), 0.0, lost)[:last]
-    outside = np.flatnonzero(
-        (energy[:last] < below)
-        | (energy[:last] > high + _RESERVE * width + lost[:last])
-    )
-    return int(outside[-1]) + 1 if outside.size else 0
+    earlier = energy[:last]
+    lost_earlier = lost[:last]
+    top = high + _RESERVE * width + lost_earlier
+    known_losses = np.where(np.isinf(lost_earlier), 0.0, lost_earlier)
+    bottom = low - _RESERVE * width - known_losses
+    outside = np.flatnonzero((earlier < bottom) | (earlier > top))
+    if not outside.size:
+        return 0
+    return int(outside[-1]) + 1
 
 
 def _has_slow_swings(energy: Samples, lost: Samples, least: float) -> bool:

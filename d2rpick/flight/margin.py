@@ -180,11 +180,9 @@ def is_grazing(history: History, flight: Flight, within: float) -> bool:
     contact = _find_contact(history, flight)
     if contact is None or flight.end is None:
         return False
-    after_contact = find_window(contact.time, flight.end, flight.end + within)
-    if (
-        contact.time[after_contact].size < _FEWEST
-        or contact.time[-1] <= flight.end + within
-    ):
+    end = flight.end + within
+    after_contact = find_window(contact.time, flight.end, end)
+    if contact.time[after_contact].size < _FEWEST or contact.time[-1] <= end:
         return False
     limit = _GRAZING_FORCE * contact.force.max()
     return bool(contact.force[after_contact].max() < limit)
@@ -202,26 +200,29 @@ def changes_momentum_little(history: History, flight: Flight) -> bool:
     speed = compute_closing_speed(history, flight)
     if contact is None or evidence is None or speed is None:
         return False
-    acts = contact.force[contact.begin :] > _GRAZING_FORCE * contact.force.max()
-    if not acts.any():
+    limit = _GRAZING_FORCE * contact.force.max()
+    acting = np.flatnonzero(contact.force[contact.begin :] > limit)
+    if not acting.size:
         return False
-    first = int(np.argmax(acts))
-    rests = ~acts[first:]
-    over = [
-        state
-        for state in range(rests.size - _FEWEST + 1)
-        if rests[state : state + _FEWEST].all()
-    ]
-    if not over:
+    first = contact.begin + int(acting[0])
+    is_free = contact.force[first:] <= limit
+    # The contact is over at the first of several free states.
+    ends = (
+        first + state
+        for state in range(is_free.size - _FEWEST + 1)
+        if is_free[state : state + _FEWEST].all()
+    )
+    end = next(ends, None)
+    if end is None:
         return False
-    begin, end = contact.begin, contact.begin + first + over[0]
+    begin = contact.begin
     duration = contact.time[end] - contact.time[begin]
-    impulse = contact.momentum[end] - contact.momentum[begin]
-    impulse = impulse - contact.gravity * duration
+    change = contact.momentum[end] - contact.momentum[begin]
+    impulse = change - contact.gravity * duration
     momenta, members = evidence
     mass = 1.0 if momenta.velocity else momenta.mass(members)
-    towards = mass * abs(speed)
-    return bool(np.linalg.norm(impulse) < _GRAZING_MOMENTUM * towards)
+    momentum_of_approach = mass * abs(speed)
+    return bool(np.linalg.norm(impulse) < _GRAZING_MOMENTUM * momentum_of_approach)
 
 
 def estimate_spread_of_vibration(history: History, flight: Flight) -> float | None:
@@ -262,12 +263,9 @@ def estimate_spread_of_vibration(history: History, flight: Flight) -> float | No
     """
     balance = history.balance
     momentum = _get_momentum_in_flight(history, flight)
-    if (
-        balance is None
-        or balance.internal is None
-        or balance.kinetic is None
-        or momentum is None
-    ):
+    if balance is None or balance.internal is None or balance.kinetic is None:
+        return None
+    if momentum is None:
         return None
     start, end = flight.within(history.time)
     inside = find_window(balance.time, start, end)
@@ -277,9 +275,8 @@ def estimate_spread_of_vibration(history: History, flight: Flight) -> float | No
     vibration = float(energy.mean()) - max(0.0, float(energy.min()))
     crossings = int(np.count_nonzero(np.diff(energy > energy.mean())))
     omega = np.pi * crossings / (2 * (end - start))
-    approach = float(balance.kinetic[inside][-1]) * _compute_share_towards_ground(
-        momentum
-    )
+    share = _compute_share_towards_ground(momentum)
+    approach = float(balance.kinetic[inside][-1]) * share
     if vibration <= 0 or crossings == 0:
         return 0.0
     if approach > 0:
@@ -296,12 +293,11 @@ def compute_energy_of_approach(history: History, flight: Flight) -> float | None
     momentum = _get_momentum_in_flight(history, flight)
     if balance is None or balance.kinetic is None or momentum is None:
         return None
-    kinetic = balance.kinetic[find_window(balance.time, *flight.within(history.time))]
-    return (
-        float(kinetic[-1]) * _compute_share_towards_ground(momentum)
-        if kinetic.size
-        else None
-    )
+    inside = find_window(balance.time, *flight.within(history.time))
+    kinetic = balance.kinetic[inside]
+    if not kinetic.size:
+        return None
+    return float(kinetic[-1]) * _compute_share_towards_ground(momentum)
 
 
 def _get_momentum_in_flight(history: History, flight: Flight) -> Samples | None:
@@ -313,9 +309,8 @@ def _get_momentum_in_flight(history: History, flight: Flight) -> Samples | None:
     moving = np.ptp(momenta.values, axis=0).any(axis=1)
     if set(np.flatnonzero(moving).tolist()) - set(members):
         return None
-    values = momenta.of(members)[
-        find_window(momenta.time, *flight.within(momenta.time))
-    ]
+    inside = find_window(momenta.time, *flight.within(momenta.time))
+    values = momenta.of(members)[inside]
     return values if len(values) > 1 else None
 
 
@@ -328,8 +323,11 @@ def select_momenta_of_flight(
             continue
         if momenta.parts is None or flight.parts is None:
             return momenta, range(momenta.values.shape[1])
-        flying = {part.id for part in flight.parts}
-        return momenta, [i for i, part in enumerate(momenta.parts) if part.id in flying]
+        flying_ids = {part.id for part in flight.parts}
+        columns = [
+            column for column, part in enumerate(momenta.parts) if part.id in flying_ids
+        ]
+        return momenta, columns
     return None
 
 
@@ -356,14 +354,15 @@ def compute_closing_speed(history: History, flight: Flight) -> float | None:
     if momentum_of_body is None:
         return None
     momenta, members = momentum_of_body
-    momentum = momenta.of(members)[
-        find_window(momenta.time, *flight.within(momenta.time))
-    ]
+    inside = find_window(momenta.time, *flight.within(momenta.time))
+    momentum = momenta.of(members)[inside]
     mass = 1.0 if momenta.velocity else momenta.mass(members)
     if len(momentum) < 2 or not mass > 0:
         return None
     direction = find_direction_of_approach(history, flight)
-    return 0.0 if direction is None else float(momentum[-1] @ direction) / mass
+    if direction is None:
+        return 0.0
+    return float(momentum[-1] @ direction) / mass
 
 
 def _compute_share_towards_ground(momentum: Samples) -> float:
@@ -385,4 +384,6 @@ def _find_direction_of_change(momentum: Samples) -> Samples | None:
     size = float(np.linalg.norm(change))
     along = change if size > _ROUNDING * largest else momentum[-1]
     length = float(np.linalg.norm(along))
-    return np.asarray(along / length) if length > 0 else None
+    if not length > 0:
+        return None
+    return np.asarray(along / length)

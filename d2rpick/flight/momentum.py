@@ -88,14 +88,16 @@ def find_flight_around(
     best: FreeFlight | None = None
     if momenta.at_rest:
         return None
-    for members in (
-        [momenta.flying] if momenta.flying else _list_sets_to_try(momenta, td)
-    ):
+    sets: Iterable[Sequence[int]]
+    if momenta.flying:
+        sets = [momenta.flying]
+    else:
+        sets = _list_sets_to_try(momenta, td)
+    for members in sets:
         flight = find_flight_of(momenta, members, td, balance)
-        if flight and (
-            best is None
-            or flight.end - flight.start > _LONGER * (best.end - best.start)
-        ):
+        if flight is None:
+            continue
+        if best is None or flight.duration > _LONGER * best.duration:
             best = _limit_to_flights_of_bodies(momenta, members, td, flight) or best
     return best
 
@@ -129,37 +131,30 @@ def _collect_bodies_apart(momenta: Momenta, *members: int) -> tuple[int, ...]:
 
 def _search_bodies_apart(momenta: Momenta, members: Sequence[int]) -> Iterator[int]:
     """Find the parts among ``members`` that fly separately as defined in `find_bodies_apart`."""
+    time = momenta.time
     mass = momenta.mass(members)
     masses = momenta.masses
-    if (
-        not momenta.parts
-        or len(members) < 2
-        or masses is None
-        or not mass > 0
-        or momenta.time.size < FEWEST
-    ):
+    if not momenta.parts or len(members) < 2 or time.size < FEWEST:
+        return
+    if masses is None or not mass > 0:
         return
     velocity = momenta.of(members) / mass
     room = _OF_ITS_OWN * float(np.abs(velocity).max())
-    least_time = _BY_ITSELF * float(momenta.time[-1] - momenta.time[0])
-    spans = np.gradient(momenta.time)
+    least_time = _BY_ITSELF * float(time[-1] - time[0])
+    durations = np.gradient(time)
     for part in members:
         if not masses[part] > 0:
             continue
-        relative = np.linalg.norm(
-            momenta.values[:, part] / masses[part] - velocity, axis=1
-        )
-        if float(spans[relative > room].sum()) <= least_time:
+        velocity_of_part = momenta.values[:, part] / masses[part]
+        relative_speed = np.linalg.norm(velocity_of_part - velocity, axis=1)
+        if float(durations[relative_speed > room].sum()) <= least_time:
             continue  # A separate flight of this part would be too short to matter.
-        apart = (
-            flight.end - flight.start
-            for flight in _find_flights_of_part(momenta, part)
-            if float(
-                relative[find_window(momenta.time, flight.start, flight.end)].min()
-            )
-            > room
-        )
-        if sum(apart) > least_time:
+        time_apart = 0.0
+        for flight in _find_flights_of_part(momenta, part):
+            inside = find_window(time, flight.start, flight.end)
+            if float(relative_speed[inside].min()) > room:
+                time_apart += flight.duration
+        if time_apart > least_time:
             yield part
 
 
@@ -178,34 +173,31 @@ def find_flight_of(
     if time.size < FEWEST or not time[0] <= td <= time[-1]:
         return None
     extent = float(np.ptp(momentum, axis=0).max())
+    largest = float(np.abs(momentum).max())
     noise = momenta.noise(members)
     parts = None if momenta.parts is None else tuple(momenta.parts[i] for i in members)
     gravities = momenta.surroundings.gravity_on(parts)
-    if extent <= max(2 * noise, LAST_DIGIT * float(np.abs(momentum).max())):
-        is_flight = float(np.abs(momentum).max()) > noise and _has_clear_motion(
-            momenta, members, noise
-        )
-        is_flight = is_flight and (gravities is None or 0.0 in gravities)
+    if extent <= max(2 * noise, LAST_DIGIT * largest):
+        # The momentum is constant, so no force acts on the parts at any time, or they are at rest.
+        may_be_weightless = gravities is None or 0.0 in gravities
+        if largest <= noise or not may_be_weightless:
+            return None
+        if not _has_clear_motion(momenta, members, noise):
+            return None
         whole = FreeFlight.of(time, (0, time.size - 1), parts)
-        return (
-            limit_to_unheld(momenta.surroundings, whole, parts, td)
-            if is_flight
-            else None
-        )
+        return limit_to_unheld(momenta.surroundings, whole, parts, td)
     if noise > TOLERANCE * extent:
         return None
     laws = get_laws_of(momenta, tuple(members), balance)
     states, gravity = laws.window(td)
-    if states is None or (
-        not gravity and gravities is None and _has_falling_part(momenta)
-    ):
+    if states is None:
+        return None
+    if not gravity and gravities is None and _has_falling_part(momenta):
         return None  # A part that does not fall while others do is supported.
     first, last = states
     inside = momentum[first : last + 1]
-    if (
-        float(np.abs(inside[inside.shape[0] // 2 :]).max())
-        <= _HELD * float(np.abs(momentum).max()) + noise
-    ):
+    second_half = inside[inside.shape[0] // 2 :]
+    if float(np.abs(second_half).max()) <= _HELD * largest + noise:
         steady = VISIBLE * max(noise, float(np.ptp(inside, axis=0).max()))
         if gravity or float(np.abs(inside.mean(axis=0)).max()) <= steady:
             return None  # The parts are either held by supports or at rest.
@@ -253,9 +245,8 @@ def find_all_flights(
 def can_deny_flight(momenta: Momenta) -> bool:
     """Return True if the chosen parts or the model move enough for their momentum to rule out a flight."""
     change = momenta.change(momenta.chosen)
-    return momenta.time.size >= FEWEST and change > VISIBLE * momenta.noise(
-        momenta.chosen
-    )
+    noise = momenta.noise(momenta.chosen)
+    return momenta.time.size >= FEWEST and change > VISIBLE * noise
 
 
 def _has_clear_motion(momenta: Momenta, members: Sequence[int], noise: float) -> bool:
@@ -280,11 +271,10 @@ def _list_sets_to_try(momenta: Momenta, td: float) -> Iterator[tuple[int, ...]]:
     """
     chosen = tuple(momenta.chosen)
     yield chosen
-    if (
-        len(chosen) == momenta.values.shape[1]
-        and len(apart := find_bodies_apart(momenta, chosen)) > 0
-    ):
-        yield apart
+    if len(chosen) == momenta.values.shape[1]:
+        apart = find_bodies_apart(momenta, chosen)
+        if apart:
+            yield apart
     attached = tuple(sorted({*chosen, *_find_attached_parts(momenta, chosen, td)}))
     if attached != chosen:
         yield attached
@@ -302,34 +292,35 @@ def _find_attached_parts(
     a body.
     """
     time = momenta.time
-    back = (time >= td - _LOOK_BACK * (time[-1] - time[0])) & (time <= td)
-    look = np.flatnonzero(back)[:: max(1, int(back.sum()) // _LOOK_STATES)]
-    if look.size < FEWEST:
+    start = td - _LOOK_BACK * (time[-1] - time[0])
+    states = np.flatnonzero((time >= start) & (time <= td))
+    states = states[:: max(1, states.size // _LOOK_STATES)]
+    if states.size < FEWEST:
         return ()
-    rests = remove_line(time[look], momenta.values[look].reshape(look.size, -1))
-    rests = (
-        rests.reshape(look.size, -1, 3)
-        .transpose(1, 0, 2)
-        .reshape(momenta.values.shape[1], -1)
-    )
+    part_count = momenta.values.shape[1]
+    columns = momenta.values[states].reshape(states.size, -1)
+    deviations = remove_line(time[states], columns).reshape(states.size, part_count, 3)
+    # One row for each part, with the values of all states and directions.
+    rests = deviations.transpose(1, 0, 2).reshape(part_count, -1)
     sizes = np.linalg.norm(rests, axis=1)
     moving = [i for i in momenta.moving if sizes[i] > 0]
     if not set(chosen) & set(moving):
         return ()
-    wider = (
-        len(moving) > rests.shape[1]
-    )  # The full set of left singular vectors is only needed if there are more parts than columns.
+    moving_sizes = sizes[moving]
+    # The full set of left singular vectors is only needed if there are more parts than columns.
+    is_wider = len(moving) > rests.shape[1]
     left_vectors, values, _ = np.linalg.svd(
-        rests[moving] / sizes[moving, np.newaxis], full_matrices=wider
+        rests[moving] / moving_sizes[:, np.newaxis], full_matrices=is_wider
     )
     values = np.append(values, np.zeros(len(moving) - values.size))
-    null = left_vectors[:, values <= _CANCELS * values[0]]
-    shares = (null @ null.T) / np.outer(sizes[moving], sizes[moving])
-    rows = [moving.index(i) for i in chosen if i in moving]
-    joined = (shares[rows] > np.diag(shares)[rows, np.newaxis] / 2).any(axis=0)
-    return _refine_attached_parts(
-        rests, {*chosen, *np.array(moving)[joined].tolist()}, chosen, moving
-    )
+    null_space = left_vectors[:, values <= _CANCELS * values[0]]
+    projector = (null_space @ null_space.T) / np.outer(moving_sizes, moving_sizes)
+    chosen_rows = [moving.index(i) for i in chosen if i in moving]
+    # In the projector, the parts of a body have equal entries, and those of different bodies have zeros.
+    own_entries = np.diag(projector)[chosen_rows, np.newaxis]
+    is_joined = (projector[chosen_rows] > own_entries / 2).any(axis=0)
+    joined = np.array(moving)[is_joined].tolist()
+    return _refine_attached_parts(rests, {*chosen, *joined}, chosen, moving)
 
 
 def _refine_attached_parts(
@@ -339,13 +330,14 @@ def _refine_attached_parts(
     total = rests[sorted(members)].sum(axis=0)
     free = [i for i in moving if i not in chosen]
     while free:
-        sides = np.array([-1.0 if i in members else 1.0 for i in free])
-        changes = sides[:, np.newaxis] * rests[free]
+        # A member would be removed from the sum, any other part added.
+        signs = np.array([-1.0 if i in members else 1.0 for i in free])
+        changes = signs[:, np.newaxis] * rests[free]
         sizes = np.linalg.norm(total + changes, axis=1)
         best = int(np.argmin(sizes))
         if sizes[best] >= (1 - _ROUNDED) * np.linalg.norm(total):
             break
-        total = total + sides[best] * rests[free[best]]
+        total = total + changes[best]
         members = members ^ {free[best]}
     return tuple(sorted(members - set(chosen)))
 
@@ -380,9 +372,8 @@ def replace_words_by_part_ids(run: OpenedRun, selection: Selection) -> Selection
 def list_deformable_parts(run: OpenedRun) -> tuple[Part, ...]:
     """Return the parts that have internal energy at any time; raise FormatError if there are none."""
     parts = run.parts
-    energies = run.part_energies(
-        parts
-    )  # This call raises an error if no energies are written.
+    # This call raises an error if no energies are written.
+    energies = run.part_energies(parts)
     with_energy = tuple(
         part for part, energy in zip(parts, energies.T, strict=True) if energy.any()
     )
@@ -401,16 +392,13 @@ def find_flying_parts(run: OpenedRun) -> tuple[Part, ...]:
     deck, or if none of these sets flies, the sets are those of `find_parts_flying_together`.
     """
     deformable, momenta = _get_parts_and_momenta(run)
-    flights = (
-        list(_list_flights_of_bodies(momenta, run.surroundings.bodies()))
-        if momenta
-        else []
-    )
-    return (
-        _select_heaviest_parts(run, deformable, momenta, flights)
-        if flights
-        else find_parts_flying_together(run)
-    )
+    flights: list[FreeFlight] = []
+    if momenta:
+        bodies = run.surroundings.bodies()
+        flights = list(_list_flights_of_bodies(momenta, bodies))
+    if not flights:
+        return find_parts_flying_together(run)
+    return _select_heaviest_parts(run, deformable, momenta, flights)
 
 
 def find_parts_flying_together(run: OpenedRun) -> tuple[Part, ...]:
@@ -445,14 +433,13 @@ def _list_cores(momenta: Momenta) -> Iterator[tuple[int, ...]]:
     sets: set[tuple[int, ...]] = set()
     for td in list_moments(momenta.time):
         attached = _find_attached_parts(momenta, (heaviest,), td)
-        core = tuple(
-            sorted(
-                (heaviest, *(i for i in attached if not _is_sliding(momenta, i, td)))
-            )
-        )
-        if (
-            len(core) <= len(attached) and core not in sets
-        ):  # Each set of parts is tried only once.
+        staying = [i for i in attached if not _is_sliding(momenta, i, td)]
+        # The set without sliding parts differs from the attached parts only if at least one of them slides.
+        if len(staying) == len(attached):
+            continue
+        core = tuple(sorted((heaviest, *staying)))
+        # Each set of parts is tried only once.
+        if core not in sets:
             sets.add(core)
             yield core
 
@@ -460,17 +447,19 @@ def _list_cores(momenta: Momenta) -> Iterator[tuple[int, ...]]:
 def _is_sliding(momenta: Momenta, part: int, td: float) -> bool:
     """Return True if a part moves under a constant force other than gravity around ``td`` [time]."""
     laws = get_laws_of(momenta, (part,))
-    straight = find_lasting_window(laws.fit, td, laws.extent, laws.noise, fades=True)
-    return straight is not None and find_flight_of(momenta, (part,), td) is None
+    window = find_lasting_window(laws.fit, td, laws.extent, laws.noise, fades=True)
+    if window is None:
+        return False
+    return find_flight_of(momenta, (part,), td) is None
 
 
 def _get_parts_and_momenta(run: OpenedRun) -> tuple[tuple[Part, ...], Momenta | None]:
     """Return the deformable parts and their momenta; None if the run contains no part momenta."""
     deformable = list_deformable_parts(run)
-    return deformable, next(
-        (candidate for candidate in run.momenta(deformable, None) if candidate.parts),
-        None,
-    )
+    for momenta in run.momenta(deformable, None):
+        if momenta.parts:
+            return deformable, momenta
+    return deformable, None
 
 
 def _list_flights_of_bodies(
@@ -490,10 +479,10 @@ def _select_heaviest_parts(
     run: OpenedRun,
     deformable: Sequence[Part],
     momenta: Momenta | None,
-    found: Sequence[FreeFlight],
+    flights: Sequence[FreeFlight],
 ) -> tuple[Part, ...]:
     """Return the deformable parts of the flight with the largest product of mass and duration."""
-    if not found or momenta is None:
+    if not flights or momenta is None:
         raise FormatError(
             f"{run.name}: no momenta show which parts fly together; name the switched parts with `parts`"
         )
@@ -501,13 +490,14 @@ def _select_heaviest_parts(
         masses = np.ones(len(run.parts))
     else:
         masses = np.nan_to_num(momenta.masses)
-    mass = dict(zip(run.parts, masses.tolist(), strict=True))
-    best = max(
-        found,
-        key=lambda flight: (
-            (flight.end - flight.start) * sum(mass[part] for part in flight.parts or ())
-        ),
-    )
+    mass_by_part = dict(zip(run.parts, masses.tolist(), strict=True))
+
+    def weigh(flight: FreeFlight) -> float:
+        """Return the product of mass and duration of a flight."""
+        mass = sum(mass_by_part[part] for part in flight.parts or ())
+        return flight.duration * mass
+
+    best = max(flights, key=weigh)
     return tuple(part for part in deformable if part in (best.parts or ()))
 
 
@@ -531,9 +521,10 @@ def is_complete(
     if whole is None or whole.velocity or whole.time.size != momenta.time.size:
         return np.ones(momenta.time.size, np.bool_)
     all_parts = range(momenta.values.shape[1])
+    of_parts = momenta.of(all_parts)
     of_model = whole.values[:, 0]
-    so_far = np.maximum.accumulate(np.abs(of_model).max(axis=1))
-    largest = np.maximum(so_far, before)
-    difference = np.abs(momenta.of(all_parts) - of_model).max(axis=1)
-    limit = _ALL_OF_IT * largest + 2 * momenta.noise(all_parts)
+    sizes = np.abs(of_model).max(axis=1)
+    largest_so_far = np.maximum(np.maximum.accumulate(sizes), before)
+    difference = np.abs(of_parts - of_model).max(axis=1)
+    limit = _ALL_OF_IT * largest_so_far + 2 * momenta.noise(all_parts)
     return np.asarray(difference <= limit)

@@ -12,6 +12,7 @@ error, because its momentum does not change and no part of it is frozen in a dif
 
 from __future__ import annotations
 
+from math import ceil
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
@@ -80,14 +81,14 @@ class Drift:
         self, time: Samples, place: Samples, path: Samples, part: Part, doubt: float, turning: Turning | None = None,
         *, moving: Sequence[int] = (), slow: bool = False,
     ) -> None:  # fmt: skip
-        self.time, self.place, self.path, self.part, self.doubt = (
-            time,
-            place,
-            path,
-            part,
-            doubt,
-        )
-        self.turning, self.moving, self.slow = turning, tuple(moving), slow
+        self.time = time
+        self.place = place
+        self.path = path
+        self.part = part
+        self.doubt = doubt
+        self.turning = turning
+        self.moving = tuple(moving)
+        self.slow = slow
 
     @cached_property
     def at_least(self) -> bool:
@@ -97,11 +98,8 @@ class Drift:
         more than the body rotates. Without a deck, it is the case if the deformation of the other parts is a notable
         fraction of the part's motion.
         """
-        moved = float(
-            np.sqrt(
-                np.mean(np.square(self.place - self.place.mean(axis=0)).sum(axis=1))
-            )
-        )
+        squares = np.square(self.place - self.place.mean(axis=0)).sum(axis=1)
+        moved = float(np.sqrt(np.mean(squares)))
         if moved <= _HARDLY * self.limit:
             return False
         if self.slow or self.turning is None:
@@ -117,11 +115,11 @@ class Drift:
         """
         if self.turning:
             return self._inside(tr, td, self.turning.offsets(tr, td))
-        place_at_td = np.stack(
-            [np.interp([*tr.tolist(), td], self.time, axis) for axis in self.place.T],
-            axis=1,
-        )
-        return self._inside(tr, td, place_at_td[:-1] - place_at_td[-1])
+        times = [*tr.tolist(), td]
+        columns = [np.interp(times, self.time, axis) for axis in self.place.T]
+        places = np.stack(columns, axis=1)
+        place_at_td = places[-1]
+        return self._inside(tr, td, places[:-1] - place_at_td)
 
     def errors_at_contact(self, tr: Samples, direction: Samples | None) -> Samples:
         """Return the position errors at the contact that ends the flight for tr (k,) [length]; NaN outside the flight.
@@ -145,12 +143,11 @@ class Drift:
 
     def _inside(self, tr: Samples, td: float, vectors: Samples) -> Samples:
         """Return the length of each vector (k, 3), or NaN for times outside the flight."""
-        inside = (
-            (tr >= self.time[0])
-            & (tr <= self.time[-1])
-            & (self.time[0] <= td <= self.time[-1])
-        )
-        return np.where(inside, np.linalg.norm(vectors, axis=1), np.nan)
+        start, end = self.time[[0, -1]]
+        is_tr_inside = (tr >= start) & (tr <= end)
+        is_td_inside = start <= td <= end
+        lengths = np.linalg.norm(vectors, axis=1)
+        return np.where(is_tr_inside & is_td_inside, lengths, np.nan)
 
     @cached_property
     def limit(self) -> float:
@@ -182,11 +179,9 @@ def find_drift(
         None if the displacement is unknown: a mass is unknown; there are fewer than three parts, or two of three have
         almost no mass; or the other parts are far from one rigid body and no deck shows how they rotate.
     """
-    momenta, masses, inside = (
-        seen.momenta,
-        seen.masses,
-        find_window(seen.momenta.time, seen.start, seen.end),
-    )
+    momenta = seen.momenta
+    masses = seen.masses
+    inside = find_window(momenta.time, seen.start, seen.end)
     time = momenta.time[inside]
     mass = masses[list(seen.members)]
     if momenta.parts is None or time.size < FEWEST or not np.isfinite(mass).all():
@@ -195,35 +190,33 @@ def find_drift(
     mass = masses[members]
     if not has_clear_rotation(mass):
         return None
-    ways, path = integrate_displacements(
-        time, momenta.values[inside][:, members] / mass[:, np.newaxis], mass
-    )
-    stride = -(-time.size // _STATES)
-    moving, rate, misfit = find_moving_parts(time[::stride], ways[::stride], mass)
+    velocity = momenta.values[inside][:, members] / mass[:, np.newaxis]
+    ways, path = integrate_displacements(time, velocity, mass)
+    stride = ceil(time.size / _STATES)
+    some_times = time[::stride]
+    moving, rate, misfit = find_moving_parts(some_times, ways[::stride], mass)
     if not moving:
         return None
-    whole = float(
-        np.nansum(masses[sorted({*seen.others, *members})])
-    )  # Parts with unknown positions are left out, because they would make the error too small.
-    share = float(mass[moving].sum()) / whole
-    doubt = share * float(
-        np.sqrt(misfit / ((mass.sum() - mass[moving].sum()) * -(-time.size // stride)))
-    )
-    offsets = (
-        _compute_offsets(time, ways, mass, moving, rate) * float(mass.sum()) / whole
-    )
-    against = [members[i] for i in moving]
-    ids = [momenta.parts[i].id for i in against]
-    part = momenta.parts[against[int(np.argmax(np.square(offsets).sum(axis=(0, 2))))]]
+    # Parts with unknown positions are left out, because they would make the error too small.
+    flying_mass = float(np.nansum(masses[sorted({*seen.others, *members})]))
+    moving_mass = mass[moving].sum()
+    share = float(moving_mass) / flying_mass
+    # The misfit is the sum of m r^2 over the other parts and the states.
+    mean_square = misfit / ((mass.sum() - moving_mass) * some_times.size)
+    doubt = share * float(np.sqrt(mean_square))
+    offsets_alone = _compute_offsets(time, ways, mass, moving, rate)
+    offsets = offsets_alone * float(mass.sum()) / flying_mass
+    moving_columns = [members[i] for i in moving]
+    ids = [momenta.parts[i].id for i in moving_columns]
+    effects = np.square(offsets).sum(axis=(0, 2))
+    part = momenta.parts[moving_columns[int(np.argmax(effects))]]
     if placement:
         body = seen._replace(members=members)
-        turning = follow_turning(body, against, placement, displacements)
+        turning = follow_turning(body, moving_columns, placement, displacements)
     else:
         turning = None
     offset = offsets.sum(axis=1)
-    slow = (
-        bool(rate.any()) and count_periods(time[::stride], offset[::stride], rate) < 1
-    )
+    slow = bool(rate.any()) and count_periods(some_times, offset[::stride], rate) < 1
     drift = Drift(time, offset, path, part, doubt, turning, moving=ids, slow=slow)
     return drift if turning or doubt <= drift.limit else None
 
@@ -232,11 +225,12 @@ def integrate_displacements(
     time: Samples, velocity: Samples, mass: Samples
 ) -> tuple[Samples, Samples]:
     """Return the displacements of parts (n, parts, 3) from their centre of mass, and its path (n,) [length]."""
-    centre = np.average(velocity, axis=1, weights=mass)
-    ways = integrate_by_trapezia(
-        time, (velocity - centre[:, np.newaxis]).reshape(time.size, -1)
-    ).reshape(velocity.shape)
-    return ways, integrate_by_trapezia(time, np.linalg.norm(centre, axis=1))
+    centre_velocity = np.average(velocity, axis=1, weights=mass)
+    relative = velocity - centre_velocity[:, np.newaxis]
+    columns = relative.reshape(time.size, -1)
+    ways = integrate_by_trapezia(time, columns).reshape(velocity.shape)
+    speed = np.linalg.norm(centre_velocity, axis=1)
+    return ways, integrate_by_trapezia(time, speed)
 
 
 def _compute_offsets(
@@ -245,13 +239,11 @@ def _compute_offsets(
     """Return how far each moving part displaces all others if nothing else flies, shape (n, moving, 3) [length]."""
     frame_parts = np.setdiff1d(np.arange(mass.size), moving)
     shares = mass[list(moving), np.newaxis] / mass.sum()
-    against = (
-        ways[:, list(moving)]
-        - np.average(ways[:, frame_parts], axis=1, weights=mass[frame_parts])[
-            :, np.newaxis
-        ]
+    centre_of_frame = np.average(
+        ways[:, frame_parts], axis=1, weights=mass[frame_parts]
     )
-    return np.asarray(-shares * subtract_circles(time, against, rate))
+    relative = ways[:, list(moving)] - centre_of_frame[:, np.newaxis]
+    return np.asarray(-shares * subtract_circles(time, relative, rate))
 
 
 def find_drift_in_flight(
@@ -290,22 +282,18 @@ def find_parts_apart(
     if time.size < FEWEST or len(members) < 2:
         return ()
     whole = momentum.sum(axis=1, keepdims=True)
-    against = (
-        momentum / mass[:, np.newaxis]
-        - (whole - momentum) / (mass.sum() - mass)[:, np.newaxis]
-    )
-    speed = np.linalg.norm(against.mean(axis=0), axis=1)
-    path = np.linalg.norm(whole[:, 0] / mass.sum(), axis=1)
-    steady = np.linalg.norm(np.ptp(against, axis=0), axis=1) <= _STEADY * speed
-    far = speed * (time[-1] - time[0]) > MOST_OF_PATH * float(
-        integrate_by_trapezia(time, path[:, np.newaxis])[-1, 0]
-    )
-    alone = steady & far & (2 * mass <= mass.sum())
-    return tuple(
-        flying.momenta.parts[i]
-        for i, is_alone in zip(members, alone.tolist(), strict=True)
-        if is_alone
-    )
+    velocity = momentum / mass[:, np.newaxis]
+    velocity_of_others = (whole - momentum) / (mass.sum() - mass)[:, np.newaxis]
+    relative = velocity - velocity_of_others
+    speed = np.linalg.norm(relative.mean(axis=0), axis=1)
+    change = np.linalg.norm(np.ptp(relative, axis=0), axis=1)
+    is_steady = change <= _STEADY * speed
+    speed_of_body = np.linalg.norm(whole[:, 0] / mass.sum(), axis=1)
+    path = float(integrate_by_trapezia(time, speed_of_body[:, np.newaxis])[-1, 0])
+    moves_far = speed * (time[-1] - time[0]) > MOST_OF_PATH * path
+    is_minor = 2 * mass <= mass.sum()
+    separate = np.flatnonzero(is_steady & moves_far & is_minor).tolist()
+    return tuple(flying.momenta.parts[members[row]] for row in separate)
 
 
 def _collect_flying(
@@ -314,24 +302,20 @@ def _collect_flying(
     """Collect the flying parts and their momenta for `find_drift`; None if the part momenta do not show the flight."""
     momenta = history.find_momenta(of_parts=True)
     masses = history.masses
-    if (
-        momenta is None
-        or momenta.parts is None
-        or masses is None
-        or flight.parts is None
-        or flight.refusal
-    ):
+    if flight.parts is None or flight.refusal:
         return None
-    ids = {part.id for part in flight.parts}
+    if momenta is None or momenta.parts is None or masses is None:
+        return None
+    flying_ids = {part.id for part in flight.parts}
     if parts is None:
-        wanted = {momenta.parts[i].id for i in momenta.chosen}
+        member_ids = {momenta.parts[i].id for i in momenta.chosen}
     else:
-        wanted = {part.id for part in parts}
-    flying = [
-        i for i in momenta.moving if momenta.parts[i].id in ids
-    ]  # Fixed parts, such as the ground, are left out.
-    members = [i for i in flying if momenta.parts[i].id in wanted]
-    return Flying(momenta, masses, members, *flight.within(momenta.time), flying)
+        member_ids = {part.id for part in parts}
+    # Fixed parts, such as the ground, are left out.
+    flying = [i for i in momenta.moving if momenta.parts[i].id in flying_ids]
+    members = [i for i in flying if momenta.parts[i].id in member_ids]
+    start, end = flight.within(momenta.time)
+    return Flying(momenta, masses, members, start, end, flying)
 
 
 class RigidBody(NamedTuple):
@@ -409,15 +393,16 @@ class Bodies:
         """
         if not self._complete:
             return None
-        errors = np.stack(
-            [drift.errors_at_contact(tr, direction) for drift in self._known]
-        )
+        errors_of_bodies = [
+            drift.errors_at_contact(tr, direction) for drift in self._known
+        ]
+        errors = np.stack(errors_of_bodies)
         inside = errors[np.isfinite(errors)]
         return float(inside.max()) if inside.size else None
 
     @property
     def limit(self) -> float:
-        """Return the largest acceptable position error [length], the smallest one of all bodies with moving parts."""
+        """Return the largest acceptable position error [length]: the smallest limit of any body with moving parts."""
         return min(
             (drift.limit for drift in self._known if drift.place.any()), default=np.inf
         )
@@ -476,27 +461,21 @@ def find_bodies_in_flight(
     """
     if not told:
         away = find_parts_apart(history, flight)
-        return Bodies(
-            [
-                None
-                if away
-                else find_drift_in_flight(history, flight, placement=placement)
-            ],
-            None,
-            away,
-            _list_other_moving_parts(history, flight, away),
-        )
-    parts = [
-        [part for part in history.parts or () if part.id in body.parts] for body in told
-    ]
-    leaving = [find_parts_apart(history, flight, body_parts) for body_parts in parts]
-    drifts = [
-        None
-        if has_leaving
-        else _find_drift_of_body(history, flight, body, body_parts, placement)
-        for body, body_parts, has_leaving in zip(told, parts, leaving, strict=True)
-    ]
-    away = sum(leaving, ())
+        staying = _list_other_moving_parts(history, flight, away)
+        drift = None
+        if not away:
+            drift = find_drift_in_flight(history, flight, placement=placement)
+        return Bodies([drift], None, away, staying)
+    drifts: list[Drift | None] = []
+    away = ()
+    for body in told:
+        parts = [part for part in history.parts or () if part.id in body.parts]
+        leaving = find_parts_apart(history, flight, parts)
+        drift = None
+        if not leaving:
+            drift = _find_drift_of_body(history, flight, body, parts, placement)
+        drifts.append(drift)
+        away += leaving
     staying = _list_other_moving_parts(history, flight, away)
     return Bodies(drifts, told, away, staying)
 
@@ -505,10 +484,13 @@ def _list_other_moving_parts(
     history: History, flight: Flight, away: Sequence[Part]
 ) -> tuple[Part, ...]:
     """Return the moving parts to be switched other than those that fly ``away``; empty if none flies away."""
-    flying = _collect_flying(history, flight, None) if away else None
+    if not away:
+        return ()
+    flying = _collect_flying(history, flight, None)
     if flying is None or flying.momenta.parts is None:
         return ()
-    parts = [flying.momenta.parts[i] for i in flying.members if flying.masses[i] > 0]
+    members = [i for i in flying.members if flying.masses[i] > 0]
+    parts = [flying.momenta.parts[i] for i in members]
     return tuple(part for part in parts if part not in away)
 
 
@@ -525,10 +507,8 @@ def _find_drift_of_body(
     if len(parts) > 1:
         return find_drift_in_flight(history, flight, parts, placement)
     (part,) = parts
-    if flight.refusal or part.id not in {
-        part_in_flight.id for part_in_flight in flight.parts or ()
-    }:
+    flying_ids = {flying_part.id for flying_part in flight.parts or ()}
+    if flight.refusal or part.id not in flying_ids:
         return None
-    return Drift(
-        np.array(flight.within(history.time)), np.zeros((2, 3)), np.zeros(2), part, 0.0
-    )
+    ends = np.array(flight.within(history.time))
+    return Drift(ends, np.zeros((2, 3)), np.zeros(2), part, 0.0)

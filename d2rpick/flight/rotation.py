@@ -7,7 +7,6 @@ the other parts most nearly form one rigid body.
 
 from __future__ import annotations
 
-from itertools import chain
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
@@ -73,28 +72,23 @@ def _fit_steady_rotation(
     stood = float(np.sum(_compute_rest(time, ways, np.zeros(3), weights) ** 2))
     if stood <= least:
         return np.zeros(3), stood
-    _, right_side, normal = (
-        term.sum(axis=0) for term in _list_linear_terms(time, ways, masses)
-    )
-    rate = np.asarray(
-        np.linalg.pinv(normal, rcond=_VANISHING, hermitian=True) @ right_side
-    )
+    terms = _list_linear_terms(time, ways, masses)
+    _, right_side, normal = (term.sum(axis=0) for term in terms)
+    inverse = np.linalg.pinv(normal, rcond=_VANISHING, hermitian=True)
+    rate = np.asarray(inverse @ right_side)
     misfit = _compute_rest(time, ways, rate, weights)
     small = _SMALL * 2 * np.pi / float(time[-1] - time[0])
     damping = 1e-3
     for _ in range(_MOST_STEPS):
-        changes = [
-            (_compute_rest(time, ways, rate + small * axis, weights) - misfit).ravel()
-            / small
-            for axis in np.eye(3)
-        ]
-        slope = np.stack(changes, axis=1)
+        columns = []
+        for axis in np.eye(3):
+            moved = _compute_rest(time, ways, rate + small * axis, weights)
+            columns.append((moved - misfit).ravel() / small)
+        slope = np.stack(columns, axis=1)
         normal = slope.T @ slope
-        damped = (
-            normal
-            + damping * np.trace(normal) * np.eye(3) / 3
-            + np.finfo(float).tiny * np.eye(3)
-        )
+        damping_matrix = damping * np.trace(normal) * np.eye(3) / 3
+        # The smallest number keeps the matrix regular if the misfit does not depend on the rate.
+        damped = normal + damping_matrix + np.finfo(float).tiny * np.eye(3)
         step = -np.linalg.solve(damped, slope.T @ misfit.ravel())
         trial = _compute_rest(time, ways, rate + step, weights)
         gain = 1 - float(np.sum(trial**2)) / max(
@@ -137,31 +131,18 @@ def count_periods(time: Samples, left: Samples, rate: Samples) -> float:
     wanted = (left - left.mean(axis=0)).ravel()
     least_misfit = 0.5 * float(wanted @ wanted)
     best_periods = np.inf
+    since_start = (time - time[0])[:, np.newaxis, np.newaxis]
+    duration = time[-1] - time[0]
     for periods in _PERIODS:
-        phase = (
-            2
-            * np.pi
-            * periods
-            * (time - time[0])[:, np.newaxis, np.newaxis]
-            / (time[-1] - time[0])
-        )
-        motions = np.concatenate(
-            [np.cos(phase) * np.eye(3), np.sin(phase) * np.eye(3)], axis=1
-        )
-        columns = (
-            subtract_circles(time, motions, rate)
-            .transpose(0, 2, 1)
-            .reshape(wanted.size, -1)
-        )
-        misfit = float(
-            np.sum(
-                (
-                    wanted
-                    - columns @ np.linalg.lstsq(columns, wanted, rcond=_VANISHING)[0]
-                )
-                ** 2
-            )
-        )
+        phase = 2 * np.pi * periods * since_start / duration
+        cosines = np.cos(phase) * np.eye(3)
+        sines = np.sin(phase) * np.eye(3)
+        motions = np.concatenate([cosines, sines], axis=1)
+        remaining_motions = subtract_circles(time, motions, rate)
+        # One column for each motion, with the values of all states and directions.
+        columns = remaining_motions.transpose(0, 2, 1).reshape(wanted.size, -1)
+        amplitudes = np.linalg.lstsq(columns, wanted, rcond=_VANISHING)[0]
+        misfit = float(np.sum((wanted - columns @ amplitudes) ** 2))
         if misfit < least_misfit:
             least_misfit = misfit
             best_periods = float(periods)
@@ -170,11 +151,9 @@ def count_periods(time: Samples, left: Samples, rate: Samples) -> float:
 
 def _compute_least_displacements(ways: Samples, masses: Samples) -> Samples:
     """Return, for each omitted part, the sum of m r^2 of all other parts about their common centre, shape (parts,)."""
-    return np.asarray(
-        _sum_without_each(
-            masses * np.sum((ways - ways.mean(axis=0)) ** 2, axis=(0, 2)), masses
-        )
-    )
+    deviations = ways - ways.mean(axis=0)
+    squares = np.sum(deviations**2, axis=(0, 2))
+    return _sum_without_each(masses * squares, masses)
 
 
 def _estimate_least_rests(time: Samples, ways: Samples, masses: Samples) -> Samples:
@@ -183,38 +162,37 @@ def _estimate_least_rests(time: Samples, ways: Samples, masses: Samples) -> Samp
     In a rotation, the velocity is rate x displacement. Therefore the displacements minus straight lines are rate x
     their integrals. This is linear in the rate, and each part can easily be removed from the normal equations.
     """
-    square, right_side, normal = (
-        _sum_without_each(term, masses)
-        for term in _list_linear_terms(time, ways, masses)
-    )
-    solved = np.einsum(
-        "pij,pj->pi",
-        np.linalg.pinv(normal, rcond=_VANISHING, hermitian=True),
-        right_side,
-    )
-    return np.asarray(square - np.einsum("pi,pi->p", right_side, solved))
+    terms = _list_linear_terms(time, ways, masses)
+    square, right_side, normal = (_sum_without_each(term, masses) for term in terms)
+    inverse = np.linalg.pinv(normal, rcond=_VANISHING, hermitian=True)
+    rate = np.einsum("pij,pj->pi", inverse, right_side)
+    explained = np.einsum("pi,pi->p", right_side, rate)
+    return np.asarray(square - explained)
 
 
 def _sum_without_each(terms: Samples, masses: Samples) -> Samples:
     """Sum quadratic terms (parts, ...) over all parts but one, about their common centre, for each omitted part."""
-    return np.asarray(terms.sum(axis=0) - (terms.T / (1 - masses / masses.sum())).T)
+    # Without a part, the common centre moves away from it, which raises its term by the factor 1/(1 - m/M).
+    shares_of_others = 1 - masses / masses.sum()
+    raised_terms = (terms.T / shares_of_others).T
+    return np.asarray(terms.sum(axis=0) - raised_terms)
 
 
 def _list_linear_terms(
     time: Samples, ways: Samples, masses: Samples
 ) -> tuple[Samples, Samples, Samples]:
     """Return the normal equations of each part: squares (parts,), right side (parts, 3), matrix (parts, 3, 3)."""
-    flat = ways.reshape(time.size, -1)
-    bent_places, arm = (
-        remove_line(time, values).reshape(ways.shape)
-        for values in (flat, integrate_by_trapezia(time, flat))
-    )
+    columns = ways.reshape(time.size, -1)
+    bent_places = remove_line(time, columns).reshape(ways.shape)
+    integrals = integrate_by_trapezia(time, columns)
+    arm = remove_line(time, integrals).reshape(ways.shape)
     square = masses * np.einsum("npi,npi->p", bent_places, bent_places)
-    right_side = masses[:, np.newaxis] * np.cross(arm, bent_places).sum(axis=0)
+    moment = np.cross(arm, bent_places).sum(axis=0)
+    right_side = masses[:, np.newaxis] * moment
+    # For any vector u, the sum of (u x arm)^2 is u (trace(outer) - outer) u.
     outer = np.einsum("npi,npj->pij", arm, arm)
-    normal = (
-        np.trace(outer, axis1=1, axis2=2)[:, np.newaxis, np.newaxis] * np.eye(3) - outer
-    )
+    trace = np.trace(outer, axis1=1, axis2=2)
+    normal = trace[:, np.newaxis, np.newaxis] * np.eye(3) - outer
     return square, right_side, masses[:, np.newaxis, np.newaxis] * normal
 
 
@@ -228,10 +206,18 @@ def _compute_rest(
 def _rotate_frame(time: Samples, rate: Samples) -> Samples:
     """Return the axes (n, 3, 3) of a frame that rotates at ``rate``; they transform row vectors into this frame."""
     size = float(np.linalg.norm(rate))
-    x, y, z = rate / size if size > 0 else np.zeros(3)
-    angle = size * (time - time[0])[:, np.newaxis, np.newaxis]
+    axis = rate / size if size > 0 else np.zeros(3)
+    since_start = time - time[0]
+    angle = size * since_start[:, np.newaxis, np.newaxis]
+    x, y, z = axis
     # The product ``across @ v`` is the cross product of the axis and v.
-    across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    across = np.array(
+        [
+            [0.0, -z, y],
+            [z, 0.0, -x],
+            [-y, x, 0.0],
+        ]
+    )
     # This is Rodrigues' formula.
     odd = np.sin(angle) * across
     even = (1 - np.cos(angle)) * (across @ across)
@@ -246,9 +232,8 @@ def find_moving_parts(
     rate = np.zeros(3)
     misfit = np.inf
     while True:
-        best_part = _find_next_moving_part(
-            time, ways, mass, np.setdiff1d(np.arange(mass.size), moving)
-        )
+        remaining = np.setdiff1d(np.arange(mass.size), moving)
+        best_part = _find_next_moving_part(time, ways, mass, remaining)
         if best_part is None or best_part.rest > _MORE_RIGID * misfit:
             return moving, rate, misfit
         part, rate, misfit, _ = best_part
@@ -278,21 +263,17 @@ def _find_next_moving_part(
         np.argsort(_estimate_least_rests(time, about, masses)),
         np.argsort(_compute_least_displacements(about, masses)),
     )
-    may = [
-        [
-            candidate
-            for candidate in left[order].tolist()
-            if _can_leave_out(mass, left, candidate)
-        ][:_TRIED]
-        for order in orders
-    ]
+    candidates: list[int] = []
+    for order in orders:
+        parts = left[order].tolist()
+        allowed = [part for part in parts if _can_leave_out(mass, left, part)]
+        candidates += allowed[:_TRIED]
     trials = [
         _leave_part_out(time, ways, mass, left, part)
-        for part in dict.fromkeys(chain(*may))
+        for part in dict.fromkeys(candidates)
     ]
-    nothing = _VANISHING * float(
-        np.sum(masses[:, np.newaxis] * (about - about.mean(axis=0)) ** 2)
-    )
+    squares = (about - about.mean(axis=0)) ** 2
+    nothing = _VANISHING * float(np.sum(masses[:, np.newaxis] * squares))
     least_misfit = min((trial.rest for trial in trials), default=0.0) + nothing
     alike = [trial for trial in trials if _MORE_RIGID * trial.rest <= least_misfit]
     return max(alike, key=lambda trial: trial.effect, default=None)
@@ -303,27 +284,18 @@ def _leave_part_out(
 ) -> _Apart:
     """Omit one part, and fit the rotation of the others."""
     remaining = left[left != part]
-    path_of_part = (
-        ways[:, [part]]
-        - np.average(ways[:, remaining], axis=1, weights=mass[remaining])[:, np.newaxis]
-    )
-    least_way = (
-        _NOTABLE_WAY**2
-        * mass[remaining].sum()
-        * float(np.sum((path_of_part - path_of_part.mean(axis=0)) ** 2))
-    )
-    rate, misfit = _fit_steady_rotation(
-        time,
-        _subtract_centre(ways[:, remaining], mass[remaining]),
-        mass[remaining],
-        least_way,
-    )
-    return _Apart(
-        part,
-        rate,
-        misfit,
-        float(mass[part] * np.linalg.norm(subtract_circles(time, path_of_part, rate))),
-    )
+    ways_of_others = ways[:, remaining]
+    masses = mass[remaining]
+    centre_of_others = np.average(ways_of_others, axis=1, weights=masses)
+    path_of_part = ways[:, [part]] - centre_of_others[:, np.newaxis]
+    squares = (path_of_part - path_of_part.mean(axis=0)) ** 2
+    # A rotation that moves the other parts by a small fraction of this path is ignored.
+    least = _NOTABLE_WAY**2 * masses.sum() * float(np.sum(squares))
+    about = _subtract_centre(ways_of_others, masses)
+    rate, misfit = _fit_steady_rotation(time, about, masses, least)
+    unexplained = subtract_circles(time, path_of_part, rate)
+    effect = float(mass[part] * np.linalg.norm(unexplained))
+    return _Apart(part, rate, misfit, effect)
 
 
 def _subtract_centre(ways: Samples, mass: Samples) -> Samples:
@@ -333,11 +305,11 @@ def _subtract_centre(ways: Samples, mass: Samples) -> Samples:
 
 def _can_leave_out(mass: Samples, left: Places, part: int) -> bool:
     """Return True if the other parts have at least half of the mass, and no part has almost all of it."""
-    remaining_mass = mass[left[left != part]]
-    return bool(
-        2 * remaining_mass.sum() >= mass.sum()
-        and remaining_mass.max() <= _MOST_OF_BODY * remaining_mass.sum()
-    )
+    masses_of_others = mass[left[left != part]]
+    total = masses_of_others.sum()
+    has_half = 2 * total >= mass.sum()
+    is_spread = masses_of_others.max() <= _MOST_OF_BODY * total
+    return bool(has_half and is_spread)
 
 
 def has_clear_rotation(mass: Samples) -> bool:
@@ -345,5 +317,7 @@ def has_clear_rotation(mass: Samples) -> bool:
     if mass.size < 3:
         return False
     columns = np.arange(mass.size)
-    heavy = columns[(mass >= _HEAVY * mass.sum()) & (2 * mass <= mass.sum())]
-    return all(_can_leave_out(mass, columns, part) for part in heavy.tolist())
+    is_heavy = mass >= _HEAVY * mass.sum()
+    is_most = 2 * mass > mass.sum()
+    heavy = columns[is_heavy & ~is_most].tolist()
+    return all(_can_leave_out(mass, columns, part) for part in heavy)

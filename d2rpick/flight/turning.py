@@ -83,9 +83,9 @@ class Turning(NamedTuple):
         """
         last = float(self.time[-1])
         slid = self._compute_slides(tr, last)
-        front = self._find_front(direction) @ self.frame
-        moved = slid + np.cross(self.angles(tr, last), front)
-        return np.asarray(np.linalg.norm(moved, axis=1))
+        front_in_body = self._find_front(direction) @ self.frame
+        turned = np.cross(self.angles(tr, last), front_in_body)
+        return np.asarray(np.linalg.norm(slid + turned, axis=1))
 
     def _find_front(self, direction: Samples) -> Samples:
         """Return the coordinates (3,) of the node that lies farthest in the direction of a unit vector [length]."""
@@ -93,29 +93,30 @@ class Turning(NamedTuple):
 
     def angles(self, tr: Samples, td: float) -> Samples:
         """Return the rotation errors psi at td of a body that has been rigid since ``tr`` (k,), shape (k, 3) [rad]."""
-        pushed, kept_turn = (
-            _interpolate_at(self.time, turn, np.array([td]))
-            - _interpolate_at(self.time, turn, tr)
-            for turn in (self.pushed, self.kept)
-        )
-        turned = pushed - np.einsum(
-            "kaij,kij->ka", kept_turn, _interpolate_at(self.time, self.inertia, tr)
-        )
-        return np.asarray(
-            turned @ _interpolate_at(self.time, self.carried, np.array([td]))[0].T
-        )
+        pushed = self._compute_increase(self.pushed, tr, td)
+        per_inertia = self._compute_increase(self.kept, tr, td)
+        inertia = _interpolate_at(self.time, self.inertia, tr)
+        kept = np.einsum("kaij,kij->ka", per_inertia, inertia)
+        # The particular solution refers to the first state; the propagation matrix carries it to td.
+        carried = _interpolate_at(self.time, self.carried, np.array([td]))[0]
+        return np.asarray((pushed - kept) @ carried.T)
+
+    def _compute_increase(self, values: Samples, tr: Samples, td: float) -> Samples:
+        """Return by how much values (n, ...) increase from each ``tr`` (k,) to td, shape (k, ...)."""
+        at_td = _interpolate_at(self.time, values, np.array([td]))
+        at_tr = _interpolate_at(self.time, values, tr)
+        return np.asarray(at_td - at_tr)
 
     def offsets(self, tr: Samples, td: float) -> Samples:
         """Return the displacements (k, 3) of a body that is rigid from ``tr`` (k,) on, in the body frame [length]."""
         arm = _interpolate_at(self.time, self.arm, np.array([td]))
-        return np.asarray(
-            self._compute_slides(tr, td) + np.cross(self.angles(tr, td), arm)
-        )
+        slid = self._compute_slides(tr, td)
+        turned = np.cross(self.angles(tr, td), arm)
+        return np.asarray(slid + turned)
 
     def _compute_slides(self, tr: Samples, td: float) -> Samples:
         """Return the displacements (k, 3) from ``tr`` to td [length], without rotation, in the body frame."""
-        at_td = _interpolate_at(self.time, self.place, np.array([td]))
-        return np.asarray(at_td - _interpolate_at(self.time, self.place, tr))
+        return self._compute_increase(self.place, tr, td)
 
 
 class Flying(NamedTuple):
@@ -304,11 +305,12 @@ def _integrate_velocities(
 
     The velocity before the first state is assumed to be that of the first state.
     """
-    velocity = momenta.values[:, members] / mass[:, np.newaxis]
     time = momenta.time
-    since = integrate_by_trapezia(time, velocity.reshape(time.size, -1))
+    velocity = momenta.values[:, members] / mass[:, np.newaxis]
     before = velocity[0] * time[0]
-    return np.asarray(before + since.reshape(velocity.shape))
+    columns = velocity.reshape(time.size, -1)
+    since_first_state = integrate_by_trapezia(time, columns)
+    return np.asarray(before + since_first_state.reshape(velocity.shape))
 
 
 def _place_by_frames(centre: Samples, since: Samples, frames: Samples) -> Samples:
@@ -324,9 +326,12 @@ def _place_by_frames(centre: Samples, since: Samples, frames: Samples) -> Sample
 
 def _compute_last_rate(time: Samples, frames: Samples) -> Samples:
     """Return the mean angular velocity (3,) of frames (n, 3, 3) over the last tenth of the times (n,) [rad/time]."""
-    count = max(1, (time.size - 1) // _LAST)
-    turned = _compute_turns(frames[-count - 1 :]).sum(axis=0)
-    return np.asarray(frames[-1] @ turned / (time[-1] - time[-count - 1]))
+    step_count = max(1, (time.size - 1) // _LAST)
+    first = -step_count - 1
+    turned_in_body = _compute_turns(frames[first:]).sum(axis=0)
+    turned = frames[-1] @ turned_in_body
+    duration = time[-1] - time[first]
+    return np.asarray(turned / duration)
 
 
 def _solve_turning(
@@ -339,15 +344,12 @@ def _solve_turning(
     """
     steps = np.diff(time)[:, np.newaxis]
     # The angular momentum is constant in the fixed frame of reference; it is the mean of I w + h over the flight.
-    turned = np.einsum(
-        "nij,nj->ni",
-        _take_middle_values(everything.inertia),
-        _compute_turns(frames),
-    )
-    swept = turned + everything.spin
-    fixed_momentum = (
-        np.einsum("nij,nj->i", _take_middle_values(frames), swept) / steps.sum()
-    )
+    inertia = _take_middle_values(everything.inertia)
+    momentum_of_turns = np.einsum("nij,nj->ni", inertia, _compute_turns(frames))
+    momentum_times_step = momentum_of_turns + everything.spin
+    middle_frames = _take_middle_values(frames)
+    summed_momentum = np.einsum("nij,nj->i", middle_frames, momentum_times_step)
+    fixed_momentum = summed_momentum / steps.sum()
     momentum = fixed_momentum @ frames
     inverse_inertia = np.linalg.inv(everything.inertia.mean(axis=0))
     rate = momentum @ inverse_inertia
@@ -360,13 +362,12 @@ def _solve_turning(
     # Variation of constants: the right-hand side is carried back to the first state.
     carried_back = np.asarray(np.linalg.inv(carried), dtype=np.float64)
     back = _take_middle_values(carried_back) @ inverse_inertia
-    rate_times_step = _take_middle_values(rate) * steps
+    middle_rate = _take_middle_values(rate)
+    rate_times_step = middle_rate * steps
     rigid_inertia = _take_middle_values(rigid.inertia)
-    dragged = (
-        np.einsum("nij,nj->ni", rigid_inertia, _take_middle_values(rate)) * steps
-        + rigid.spin
-    )
-    pushed = np.einsum("nij,nj->ni", back, dragged)
+    rigid_momentum = np.einsum("nij,nj->ni", rigid_inertia, middle_rate)
+    momentum_of_rigid_parts = rigid_momentum * steps + rigid.spin
+    pushed = np.einsum("nij,nj->ni", back, momentum_of_rigid_parts)
     per_inertia = back[..., np.newaxis] * rate_times_step[:, np.newaxis, np.newaxis]
     return carried, _sum_running(pushed), _sum_running(per_inertia)
 
@@ -384,16 +385,21 @@ def _integrate_matrix(time: Samples, slope: Samples) -> Samples:
 
 def _compute_turns(frames: Samples) -> Samples:
     """Return the rotation from each frame to the next, for small angles, shape (n - 1, 3) [rad]."""
-    between = frames[:-1].transpose(0, 2, 1) @ frames[1:]
+    inverses = frames[:-1].transpose(0, 2, 1)
+    between = inverses @ frames[1:]
     # The odd part of a rotation matrix contains the rotation axis times the sine of the angle.
     odd = (between - between.transpose(0, 2, 1)) / 2
-    sine = np.stack([odd[:, 2, 1], odd[:, 0, 2], odd[:, 1, 0]], axis=1)
-    size = np.linalg.norm(sine, axis=1, keepdims=True)
-    is_turned = size > 0
-    angle = np.arcsin(np.minimum(size, 1.0))
-    divisor = np.where(is_turned, size, 1.0)
+    x = odd[:, 2, 1]
+    y = odd[:, 0, 2]
+    z = odd[:, 1, 0]
+    axis_times_sine = np.stack([x, y, z], axis=1)
+    sine = np.linalg.norm(axis_times_sine, axis=1, keepdims=True)
+    is_turned = sine > 0
+    # Rounding may raise a sine above 1.
+    angle = np.arcsin(np.minimum(sine, 1.0))
+    divisor = np.where(is_turned, sine, 1.0)
     angle_over_sine = np.where(is_turned, angle / divisor, 1.0)
-    return np.asarray(sine * angle_over_sine)
+    return np.asarray(axis_times_sine * angle_over_sine)
 
 
 def _weigh_by_mass(values: Samples, mass: Samples) -> Samples:
@@ -425,7 +431,12 @@ def _interpolate_at(time: Samples, values: Samples, when: Samples) -> Samples:
     """Return values (n, ...) at times (k,), interpolated linearly."""
     next_state = np.clip(np.searchsorted(time, when), 1, time.size - 1)
     last_state = next_state - 1
-    interval = time[next_state] - time[last_state]
-    share = (when - time[last_state]) / interval
-    share = share.reshape(-1, *[1] * (values.ndim - 1))
-    return np.asarray(values[last_state] * (1 - share) + values[next_state] * share)
+    start = time[last_state]
+    interval = time[next_state] - start
+    share = (when - start) / interval
+    # The shares (k,) multiply values of any shape (k, ...).
+    further_axes = [1] * (values.ndim - 1)
+    share = share.reshape(-1, *further_axes)
+    from_last = values[last_state] * (1 - share)
+    from_next = values[next_state] * share
+    return np.asarray(from_last + from_next)

@@ -78,9 +78,10 @@ def _bound_energy_of_rotation(history: History, flight: Flight) -> float | None:
     if not mass > 0 or momenta.time[inside].size == 0:
         return None
     momentum = momenta.of(members)[inside]
-    of_centre = np.square(momentum).sum(axis=1) / (2 * mass)
-    whole = np.interp(momenta.time[inside], kinetic.time, kinetic.values)
-    return max(0.0, float((whole - of_centre).min()))
+    energy_of_centre = np.square(momentum).sum(axis=1) / (2 * mass)
+    whole_energy = np.interp(momenta.time[inside], kinetic.time, kinetic.values)
+    least_remainder = float((whole_energy - energy_of_centre).min())
+    return max(0.0, least_remainder)
 
 
 def _compute_largest_factor(
@@ -89,12 +90,14 @@ def _compute_largest_factor(
     """Return the largest (r x n) I^-1 (r x n) over all nodes r of the given parts and all unit vectors n [1/mass]."""
     centres = np.stack([placement.parts[part].centre for part in parts])
     spreads = np.stack([placement.parts[part].spread for part in parts])
-    home = np.average(centres, axis=0, weights=mass)
-    of_points = compute_second_moments((centres - home)[np.newaxis], mass)[0]
+    centre_of_mass = np.average(centres, axis=0, weights=mass)
+    arms_of_parts = (centres - centre_of_mass)[np.newaxis]
+    of_points = compute_second_moments(arms_of_parts, mass)[0]
     of_spreads = np.einsum("p,pij->ij", mass, spreads)
     inertia = compute_inertia(of_points + of_spreads)
     inverse_inertia = np.linalg.pinv(inertia, hermitian=True)
-    arms = placement.find_nodes(parts) - home
+    arms = placement.find_nodes(parts) - centre_of_mass
+    # The columns are r x n for the three axes n.
     crossed = np.cross(arms[:, np.newaxis], np.eye(3))
     # For a node r, the largest (r x n) I^-1 (r x n) over all n is the largest eigenvalue of its matrix in n.
     matrices = np.einsum("nai,ij,nbj->nab", crossed, inverse_inertia, crossed)

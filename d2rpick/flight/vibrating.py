@@ -42,13 +42,16 @@ def find_vibrating_parts(history: History, flight: Flight) -> Beside:
     if energies is None:
         return Beside()
     time, values = energies
-    inside = slice(*np.searchsorted(time, flight.within(history.time)).tolist())
-    energy_in_flight = history.between(*flight.within(history.time))[1]
-    if energy_in_flight.size == 0 or values[inside].size == 0:
+    start, end = flight.within(history.time)
+    first, stop = np.searchsorted(time, (start, end)).tolist()
+    energies_of_others = values[first:stop]
+    _, energy_in_flight = history.between(start, end)
+    if energy_in_flight.size == 0 or energies_of_others.size == 0:
         return Beside()
-    ranges = np.ptp(values[inside], axis=0)
-    notable = ranges > _HARDLY * float(np.ptp(energy_in_flight))
-    return Beside(tuple(compress(not_chosen, notable)), float(ranges[notable].sum()))
+    ranges = np.ptp(energies_of_others, axis=0)
+    is_notable = ranges > _HARDLY * float(np.ptp(energy_in_flight))
+    parts = tuple(compress(not_chosen, is_notable))
+    return Beside(parts, float(ranges[is_notable].sum()))
 
 
 def _list_parts_not_chosen(history: History, flight: Flight) -> tuple[Part, ...]:
@@ -76,20 +79,28 @@ def extract_kinetic_energy(
     Returns
     -------
     time, energy : array of shape (n,), or None
-        States in the flight [time], [energy]; None if no file contains this energy.
+        States in the flight [time], [energy]; None if no file contains this energy, or if it contains only the fall.
 
     Notes
     -----
     Under constant gravity, the kinetic energy of the centre of mass is a quadratic function of time; damping changes it
     only slowly. Neither causes a spectral line.
     """
+    # Imported here to keep start-up fast.
+    from d2rpick.vibration.hidden_energy import RESOLVED
+
     kinetic = history.evidence.kinetic_energy(flight.parts)
     if kinetic is None:
         return None
-    inside = slice(*np.searchsorted(kinetic.time, flight.within(history.time)).tolist())
-    time = kinetic.time[inside]
-    energy = kinetic.values[inside]
+    ends = flight.within(history.time)
+    first, stop = np.searchsorted(kinetic.time, ends).tolist()
+    time = kinetic.time[first:stop]
+    energy = kinetic.values[first:stop]
     if time.size < _FEWEST:
         return None
-    since = time - time[0]
-    return time, energy - np.polyval(np.polyfit(since, energy, 2), since)
+    since_start = time - time[0]
+    parabola = np.polyfit(since_start, energy, 2)
+    vibrating = energy - np.polyval(parabola, since_start)
+    # The rounding errors of an energy that does not vibrate must not be read as modes.
+    is_resolved = np.ptp(vibrating) > RESOLVED * float(np.abs(energy).max())
+    return (time, vibrating) if is_resolved else None

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 # Initial tolerance for deviations from free flight, relative to the range over the record [-].
-# A contact exceeds the initial tolerance at once.
+# During a contact, the deviation exceeds this tolerance immediately.
 TOLERANCE = 1e-3
 # _TIGHTER: factor by which the tolerance is repeatedly reduced, as long as the window length hardly changes [-].
 # With a smaller tolerance, windows of other smooth motions shrink to less than half, but windows of flights do not.
@@ -79,6 +79,11 @@ class FreeFlight(NamedTuple):
             gravity,
         )
 
+    @property
+    def duration(self) -> float:
+        """Return the length of the window [time]."""
+        return self.end - self.start
+
 
 class Law:
     """A law of free flight over ``time`` (n,), and the deviation of a record from this law.
@@ -107,9 +112,8 @@ class Constant(Law):
 
     def __init__(self, time: Samples, values: Samples) -> None:
         super().__init__(time)
-        self.values = np.asfortranarray(
-            values
-        )  # Columns that are contiguous in memory can be processed faster.
+        # Columns that are contiguous in memory can be processed faster.
+        self.values = np.asfortranarray(values)
 
     def _misfit(self, first: int, last: int) -> float:
         return float(np.ptp(self.values[first : last + 1], axis=0).max()) / 2
@@ -199,24 +203,22 @@ def _find_converged_window(
         if enough:  # If a load fades, only one end of the window moves.
             ends = (find_longest_window(law, end, strict) for end in window)
             finer = max(finer, *ends, key=lambda states: _measure_length(time, states))
-        share = _measure_length(time, finer) / _measure_length(time, window)
+        length = _measure_length(time, window)
+        share = _measure_length(time, finer) / length
         if lasting and share < _STAYS:
             break
-        lasts = share >= (1 + np.cbrt(strict / room)) / 2 or (
-            rings and _is_ringing(law, window)
-        )
+        lasts = share >= (1 + np.cbrt(strict / room)) / 2
+        if rings and not lasts:
+            lasts = _is_ringing(law, window)
         if not _TIGHTER * limit >= finest:
             return (window, room, from_start) if lasts else lasting or last_result
-        if (
-            limit <= enough
-            and _is_fading(window, finer)
-            and (
-                last_result is None
-                or 2 * _measure_length(time, window)
-                >= _measure_length(time, last_result[0])
-            )
-        ):
-            last_result = window, room, from_start
+        if limit <= enough and _is_fading(window, finer):
+            if last_result is None:
+                is_long = True
+            else:
+                is_long = 2 * length >= _measure_length(time, last_result[0])
+            if is_long:
+                last_result = window, room, from_start
         window = finer
         limit = _TIGHTER * limit
         room = strict
@@ -227,16 +229,18 @@ def _find_converged_window(
 
 def _is_ringing(law: Law, window: tuple[int, int]) -> bool:
     """Return True if the middle half of a window has nearly the misfit of the whole window, as for a vibration."""
-    quarter = (window[1] - window[0]) // 4
-    return law.misfit(window[0] + quarter, window[1] - quarter) >= _RINGS * law.misfit(
-        *window
-    )
+    first, last = window
+    quarter = (last - first) // 4
+    misfit_of_middle = law.misfit(first + quarter, last - quarter)
+    return misfit_of_middle >= _RINGS * law.misfit(first, last)
 
 
 def _is_fading(window: tuple[int, int], finer: tuple[int, int]) -> bool:
     """Return True if a window shrinks only at the end at which a load fades, and the other end is a contact."""
-    moved = min(abs(finer[0] - window[0]), abs(finer[1] - window[1]))
-    return moved <= _STANDS * (window[1] - window[0])
+    first, last = window
+    finer_first, finer_last = finer
+    least_move = min(abs(finer_first - first), abs(finer_last - last))
+    return least_move <= _STANDS * (last - first)
 
 
 def find_longest_window(law: Law, at: int, room: float) -> tuple[int, int]:
@@ -247,15 +251,11 @@ def find_longest_window(law: Law, at: int, room: float) -> tuple[int, int]:
     """
     last_state = law.time.size - 1
     first = find_farthest(at, 0, lambda i: law.misfit(i, at) <= room)
-    to_the_right = (
-        first,
-        find_farthest(at, last_state, lambda j: law.misfit(first, j) <= room),
-    )
+    end = find_farthest(at, last_state, lambda j: law.misfit(first, j) <= room)
     last = find_farthest(at, last_state, lambda j: law.misfit(at, j) <= room)
-    to_the_left = find_farthest(at, 0, lambda i: law.misfit(i, last) <= room), last
-    return max(
-        to_the_right, to_the_left, key=lambda window: _measure_length(law.time, window)
-    )
+    begin = find_farthest(at, 0, lambda i: law.misfit(i, last) <= room)
+    windows = (first, end), (begin, last)
+    return max(windows, key=lambda window: _measure_length(law.time, window))
 
 
 def list_moments(time: Samples) -> Iterator[float]:
@@ -269,9 +269,14 @@ def list_marks(time: Samples, td: float) -> Iterator[float]:
     The first is the nearest of the widely spaced times, because a long flight around it may contain td. The two times
     nearest to td follow.
     """
-    times = tuple(list_moments(time))
-    yield min(times[::_FAR], key=lambda moment: abs(moment - td))
-    yield from sorted(times, key=lambda moment: abs(moment - td))[:2]
+
+    def measure_distance(moment: float) -> float:
+        return abs(moment - td)
+
+    moments = tuple(list_moments(time))
+    widely_spaced = moments[::_FAR]
+    yield min(widely_spaced, key=measure_distance)
+    yield from sorted(moments, key=measure_distance)[:2]
 
 
 def find_all_windows(
@@ -280,14 +285,16 @@ def find_all_windows(
     """Find all flights of a record in ascending order; ``around`` returns the flight around a time."""
     flights: list[FreeFlight] = []
     for moment in list_moments(time):
-        if not flights or moment > flights[-1].end:
-            flight = around(moment)
-            if flight:  # Flights may overlap by a few states because of the tolerance.
-                flights.append(
-                    flight._replace(start=max(flight.start, flights[-1].end))
-                    if flights
-                    else flight
-                )
+        if flights and moment <= flights[-1].end:
+            continue
+        flight = around(moment)
+        if flight is None:
+            continue
+        if flights:
+            # Flights may overlap by a few states because of the tolerance.
+            start = max(flight.start, flights[-1].end)
+            flight = flight._replace(start=start)
+        flights.append(flight)
     return tuple(flights)
 
 

@@ -64,10 +64,8 @@ def compute_work_beyond_gravity(
     window has too few states.
     """
     inside = find_window(balance.time, start, end)
-    if (
-        balance.external_work is None
-        or balance.time[inside].size < FEWEST_STATES_OF_WORK
-    ):
+    state_count = balance.time[inside].size
+    if balance.external_work is None or state_count < FEWEST_STATES_OF_WORK:
         return None
     law = _make_law_of_external_work(balance)
     return law.misfit(inside.start, inside.stop - 1)
@@ -115,9 +113,8 @@ class _ExternalWork(Law):
     def _misfit(self, first: int, last: int) -> float:
         if last - first + 1 < FEWEST_STATES_OF_WORK:
             return 0.0
-        return _measure_unexplained_work(
-            self._balance, self._work, slice(first, last + 1)
-        )
+        states = slice(first, last + 1)
+        return _measure_unexplained_work(self._balance, self._work, states)
 
 
 def _measure_unexplained_work(
@@ -136,29 +133,30 @@ def _measure_unexplained_work(
         from d2rpick.flight.free_fall import FreeFall
 
         velocity = balance.velocity[inside]
-        gravity = integrate_by_trapezia(
-            time, velocity @ FreeFall(time, velocity).gravity()
-        )
+        acceleration = FreeFall(time, velocity).gravity()
+        gravity = integrate_by_trapezia(time, velocity @ acceleration)
         if balance.kinetic is not None:
             most_gravity = _bound_work_of_gravity(velocity, balance.kinetic[inside])
     one_sided = [gravity]
     if balance.kinetic is not None:
         one_sided.append(-integrate_by_trapezia(time, balance.kinetic[inside]))
-    error = _BENT if balance.velocity is None else _OWN_ERROR
-    unexplained = float(
-        np.abs(_fit_one_sided(work, free, one_sided, most_gravity)).max()
-    )
-    open_error = 2 * balance.precision.noise(work) + error * float(np.ptp(work))
-    return max(0.0, unexplained - open_error)
+    remainder = _fit_one_sided(work, free, one_sided, most_gravity)
+    unexplained = float(np.abs(remainder).max())
+    relative_error = _BENT if balance.velocity is None else _OWN_ERROR
+    noise = balance.precision.noise(work)
+    error = 2 * noise + relative_error * float(np.ptp(work))
+    return max(0.0, unexplained - error)
 
 
 def _bound_work_of_gravity(velocity: Samples, kinetic: Samples) -> float:
     """Return an upper bound on the mass, from kinetic energy and velocity; it limits the work of gravity."""
     squares = np.sum(velocity**2, axis=1)
-    fast = squares > _SLOW * squares.max(initial=0.0)
-    if fast.any():
-        return _MASS_ERROR * float((2 * kinetic[fast] / squares[fast]).min())
-    return np.inf
+    is_fast = squares > _SLOW * squares.max(initial=0.0)
+    if not is_fast.any():
+        return np.inf
+    # T is at least m v^2/2.
+    masses = 2 * kinetic[is_fast] / squares[is_fast]
+    return _MASS_ERROR * float(masses.min())
 
 
 def _fit_one_sided(
@@ -168,18 +166,19 @@ def _fit_one_sided(
 
     The factors of the columns of ``one_sided`` are at least 0; that of the first column is at most ``most``.
     """
-    first, *other_columns = one_sided
-    for gravity in ([first], []):
-        used = [
-            column / np.abs(column).max()
-            for column in (*gravity, *other_columns)
-            if column.any()
-        ]
-        remainder, factors = _fit_not_negative(values, free, used)
-        if not (gravity and first.any() and factors[0] > most * np.abs(first).max()):
-            return remainder
-        values = values - most * first
+    first, *others = one_sided
+    remainder, factors = _fit_not_negative(values, free, _scale_columns(one_sided))
+    if not first.any() or factors[0] <= most * np.abs(first).max():
+        return remainder
+    # The first column is subtracted with its largest factor, and the others are fitted again.
+    remaining_values = values - most * first
+    remainder, _ = _fit_not_negative(remaining_values, free, _scale_columns(others))
     return remainder
+
+
+def _scale_columns(columns: Sequence[Samples]) -> list[Samples]:
+    """Return the columns that are not all 0, divided by their largest absolute values."""
+    return [column / np.abs(column).max() for column in columns if column.any()]
 
 
 def _fit_not_negative(
@@ -214,14 +213,12 @@ def compute_change_of_balance(
         return None
     inside = find_window(balance.time, start, end)
     kinetic = None if balance.kinetic is None else balance.kinetic[inside]
-    law = _Parabola(balance.time[inside], whole[inside][:, np.newaxis], kinetic)
+    whole_in_window = whole[inside]
+    law = _Parabola(balance.time[inside], whole_in_window[:, np.newaxis], kinetic)
     misfit = law.misfit(0, law.time.size - 1)
-    return max(
-        0.0,
-        misfit
-        - 2 * balance.precision.noise(whole)
-        - _OWN_ERROR * float(np.ptp(whole[inside])),
-    )
+    rounding = 2 * balance.precision.noise(whole)
+    error_of_solver = _OWN_ERROR * float(np.ptp(whole_in_window))
+    return max(0.0, misfit - rounding - error_of_solver)
 
 
 @remember
@@ -243,36 +240,28 @@ def find_balanced_window(balance: Balance, td: float) -> FreeFlight | None:
     """
     time = balance.time
     terms = _list_terms(balance)
-    if (
-        balance.velocity is not None
-        or not terms
-        or time.size < FEWEST
-        or not time[0] <= td <= time[-1]
-    ):
+    if balance.velocity is not None or not terms:
+        return None
+    if time.size < FEWEST or not time[0] <= td <= time[-1]:
         return None
     extent = min(float(np.ptp(term)) for term in terms)
-    if (
-        balance.internal is not None
-    ):  # A crash into a fixed wall does not change the sum of energies.
+    # A crash into a fixed wall does not change the sum of energies.
+    if balance.internal is not None:
         extent = max(extent, _OF_INTERNAL * float(np.ptp(balance.internal)))
     noise = balance.precision.noise(np.stack(terms))
     if noise > _OWN_ERROR * extent:
         return None
     # The law without vibration is tried first, because the additional parameter of the other law could fit a load.
     exact, ringing = _make_laws_of_work(balance)
-    window = find_lasting_window(exact, td, extent, noise)
-    if window is None:
-        rings = find_lasting_window(ringing, td, extent, noise, rings=True)
-    else:
-        rings = None
-    states = window or rings
+    states = find_lasting_window(exact, td, extent, noise)
+    gravity_if_none_is_seen = 0.0
+    if states is None:
+        states = find_lasting_window(ringing, td, extent, noise, rings=True)
+        gravity_if_none_is_seen = np.nan
     if states is None:
         return None
-    return FreeFlight.of(
-        time,
-        states,
-        gravity=_classify_gravity(balance, *states) or (np.nan if rings else 0.0),
-    )
+    gravity = _classify_gravity(balance, *states) or gravity_if_none_is_seen
+    return FreeFlight.of(time, states, gravity=gravity)
 
 
 def list_damped_energies(
@@ -294,15 +283,15 @@ def list_damped_energies(
         return [], 0.0
     if momenta is not None and work is None and flight.gravity:
         work = _compute_work_of_gravity(balance, flight, momenta)
-    sums = [whole]
-    sums += [] if balance.damping is None else [-balance.damping]
-    sums += [] if work is None or not flight.gravity else [whole - work]
-    largest = float(
-        np.abs(whole[find_window(balance.time, flight.start, flight.end)]).max(
-            initial=0.0
-        )
-    )
-    return sums, _OF_DIGITS * balance.precision.noise(np.ones(1)) * largest
+    energies = [whole]
+    if balance.damping is not None:
+        energies.append(-balance.damping)
+    if work is not None and flight.gravity:
+        energies.append(whole - work)
+    inside = find_window(balance.time, flight.start, flight.end)
+    largest = float(np.abs(whole[inside]).max(initial=0.0))
+    relative_rounding = balance.precision.noise(np.ones(1))
+    return energies, _OF_DIGITS * relative_rounding * largest
 
 
 def _compute_work_of_gravity(
@@ -318,17 +307,12 @@ def _compute_work_of_gravity(
     momentum = momenta.of((0,))
     inside = find_window(time, flight.start, flight.end)
     force = FreeFall(time[inside], momentum[inside]).gravity()
-    along = momentum @ force / np.linalg.norm(force)
+    momentum_along = momentum @ force / np.linalg.norm(force)
     if momenta.velocity and balance.kinetic is not None:
-        along *= (
-            _bound_work_of_gravity(
-                momentum, np.interp(time, balance.time, balance.kinetic)
-            )
-            / _MASS_ERROR
-        )
-    return np.interp(
-        balance.time, time, flight.gravity * integrate_by_trapezia(time, along)
-    )
+        kinetic = np.interp(time, balance.time, balance.kinetic)
+        momentum_along *= _bound_work_of_gravity(momentum, kinetic) / _MASS_ERROR
+    work = flight.gravity * integrate_by_trapezia(time, momentum_along)
+    return np.interp(balance.time, time, work)
 
 
 def is_taken_by_damping(
@@ -347,21 +331,21 @@ def is_taken_by_damping(
     but hardly at the same rate, and the loss has to agree within 2 %. The result is None if an energy is missing.
     """
     inside = find_window(balance.time, start, end)
-    whole = balance.kinetic_and_internal
-    kinetic = balance.kinetic
     time = balance.time[inside]
-    if whole is None or kinetic is None or not time.size:
+    if balance.kinetic_and_internal is None or balance.kinetic is None or not time.size:
         return None
+    whole = balance.kinetic_and_internal[inside]
+    kinetic = balance.kinetic[inside]
     of_vibration = vibration(time)
-    largest = float((kinetic[inside] - of_vibration).max())
+    largest = float((kinetic - of_vibration).max())
     room = _LITTLE * largest
-    if float(np.ptp(whole[inside] - of_vibration)) <= room:
+    if float(np.ptp(whole - of_vibration)) <= room:
         return True
     if alpha is None:
         return False
-    taken = 2 * alpha * integrate_by_trapezia(time, kinetic[inside])
-    agreeing = max(_OWN_ERROR * largest, _RATE_ERROR * float(np.ptp(taken)))
-    return float(np.ptp(whole[inside] + taken)) <= min(room, agreeing)
+    taken = 2 * alpha * integrate_by_trapezia(time, kinetic)
+    agreement = max(_OWN_ERROR * largest, _RATE_ERROR * float(np.ptp(taken)))
+    return float(np.ptp(whole + taken)) <= min(room, agreement)
 
 
 def _classify_gravity(balance: Balance, first: int, last: int) -> float:
@@ -372,50 +356,50 @@ def _classify_gravity(balance: Balance, first: int, last: int) -> float:
     infinite if the energies grow because of gravity or another load. It is also infinite if they lose more than the
     vibration energy, and the loss is more like that due to a constant force than that due to damping.
     """
-    whole = balance.kinetic_and_internal
-    kinetic = balance.kinetic
-    if whole is None or kinetic is None:
+    if balance.kinetic_and_internal is None or balance.kinetic is None:
         return 0.0
     states = slice(first, last + 1)
-    largest = float(kinetic[states].max())
-    grown = float((whole[states] - np.minimum.accumulate(whole[states])).max())
+    time = balance.time[states]
+    whole = balance.kinetic_and_internal[states]
+    kinetic = balance.kinetic[states]
+    largest = float(kinetic.max())
+    grown = float((whole - np.minimum.accumulate(whole)).max())
     if grown > _LITTLE * largest:
         return np.inf
-    spent = -integrate_by_trapezia(balance.time[states], kinetic[states])
-    remainder, _ = _fit_not_negative(
-        whole[states], [np.ones(last - first + 1)], [spent] if spent.any() else []
-    )
-    lost = float(whole[first] - whole[last])
-    bent = float(np.ptp(remainder)) / largest if largest > 0 else 0.0
-    if (bent <= _OWN_ERROR and lost >= _MUCH * largest) or (
-        bent <= _LITTLE and lost <= _LITTLE * largest
-    ):
+    # Damping takes energy in proportion to the kinetic energy.
+    spent = -integrate_by_trapezia(time, kinetic)
+    columns = [spent] if spent.any() else []
+    remainder, _ = _fit_not_negative(whole, [np.ones_like(time)], columns)
+    lost = float(whole[0] - whole[-1])
+    misfit_of_damping = float(np.ptp(remainder)) / largest if largest > 0 else 0.0
+    is_much_and_exact = misfit_of_damping <= _OWN_ERROR and lost >= _MUCH * largest
+    is_little = misfit_of_damping <= _LITTLE and lost <= _LITTLE * largest
+    if is_much_and_exact or is_little:
         return 0.0
     if balance.internal is None or lost <= np.ptp(balance.internal[states]):
         return np.nan
-    elapsed = balance.time[states] - balance.time[first]
-    pulled, _ = _fit_not_negative(
-        whole[states], [np.ones_like(elapsed), elapsed, elapsed**2], []
-    )
-    return (
-        np.nan if bent <= _OWN_ERROR and np.ptp(remainder) < np.ptp(pulled) else np.inf
-    )
+    # A constant force changes the energy as a parabola over time.
+    elapsed = time - time[0]
+    parabola = [np.ones_like(elapsed), elapsed, elapsed**2]
+    remainder_of_force, _ = _fit_not_negative(whole, parabola, [])
+    is_more_like_damping = np.ptp(remainder) < np.ptp(remainder_of_force)
+    if misfit_of_damping <= _OWN_ERROR and is_more_like_damping:
+        return np.nan
+    return np.inf
 
 
 def _list_terms(balance: Balance) -> list[Samples]:
     """Return those written energies that only gravity and damping change in free flight."""
+    terms = []
+    if balance.worked is not None:
+        terms.append(balance.worked)
     whole = balance.kinetic_and_internal
     internal = balance.internal
-    changes = (
-        whole is not None
-        and internal is not None
-        and (np.ptp(whole) > 0 or np.ptp(internal) > 0)
-    )
-    return [
-        term
-        for term in (balance.worked, whole if changes else None)
-        if term is not None
-    ]
+    if whole is None or internal is None:
+        return terms
+    if np.ptp(whole) > 0 or np.ptp(internal) > 0:
+        terms.append(whole)
+    return terms
 
 
 class _Parabola(Law):
@@ -444,20 +428,20 @@ class _Parabola(Law):
         if time.size < FEWEST_STATES_OF_WORK:
             return 0.0
         elapsed = (time - time[0]) / (time[-1] - time[0])
-        other_columns = [
-            (column[states] - column[states.start]) / extent
-            for column in self.others
-            if (extent := np.ptp(column[states]))
-        ]
-        table = np.stack(
-            [np.ones_like(elapsed), elapsed, elapsed**2, *other_columns], axis=1
-        )
-        scale = 2.0 ** (
-            np.frexp(np.abs(self.energies[states]).max())[1] - 1
-        )  # The scale is a power of two, so that scaling is exact.
+        columns = [np.ones_like(elapsed), elapsed, elapsed**2]
+        for values in self.others:
+            inside = values[states]
+            extent = np.ptp(inside)
+            if extent:
+                columns.append((inside - inside[0]) / extent)
+        table = np.stack(columns, axis=1)
+        # The scale is a power of two, so that scaling is exact.
+        _, exponent = np.frexp(np.abs(self.energies[states]).max())
+        scale = 2.0 ** (exponent - 1)
         energies = self.energies[states] / scale
         factors, *_ = np.linalg.lstsq(table, energies, rcond=None)
-        return float(np.abs(energies - table @ factors).max()) * float(scale)
+        misfit = float(np.abs(energies - table @ factors).max())
+        return misfit * float(scale)
 
 
 def has_visible_contacts(balance: Balance) -> bool:
@@ -486,9 +470,9 @@ def find_plateau(balance: Balance, td: float) -> FreeFlight | None:
     if energy is None or not time[0] <= td <= time[-1]:
         return None
     law = _make_law_of_contacts(balance)
-    states = find_lasting_window(
-        law, td, float(np.ptp(energy)), balance.precision.noise(energy)
-    )
+    extent = float(np.ptp(energy))
+    noise = balance.precision.noise(energy)
+    states = find_lasting_window(law, td, extent, noise)
     if states is None or (states[0] == 0 and balance.external_work is None):
         return None
     return FreeFlight.of(time, states, gravity=_classify_gravity(balance, *states))

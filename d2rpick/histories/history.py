@@ -435,15 +435,20 @@ class History:
         if is_late and not self.complete:
             hint = f", where the file is cut{hint}"
         *values, first, last = format_distinctly((*times, low, high))
-        described = f"`{argument}`" if argument else subject or "time"
+        if argument:
+            described = f"`{argument}` {' '.join(values)}"
+        elif subject:
+            span = f"from {' to '.join(values)}" if len(values) > 1 else values[0]
+            described = f"{subject} {span},"
+        else:
+            described = f"time {' '.join(values)}"
         verb = "reaches" if any(low <= time <= high for time in times) else "lies"
         raise RangeError(
-            f"{', '.join(self.source)}: {described} {' '.join(values)} {verb} outside the record, "
-            f"{first} to {last}{hint}"
+            f"{', '.join(self.source)}: {described} {verb} outside the record, {first} to {last}{hint}"
         )
 
     def check_unit(self, *times: float, argument: str) -> None:
-        """Raise RangeError if the times of an ``argument`` seem to have another unit than the record."""
+        """Raise RangeError if the times of an ``argument`` seem to be in a different unit from those of the record."""
         # A time above 1/1000 of the end of the record has the right unit, so no further check is needed.
         if times[-1] * 1e3 > self.time[-1]:
             return

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections import Counter
 from functools import lru_cache
@@ -13,6 +14,8 @@ from d2rpick.base.tuples import NamedTuple
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
+# Smallest similarity of a suggested file name [-]; it is high, because equal suffixes alone make names similar.
+_LIKENESS: Final = 0.8
 TIME_UNITS = frozenset(
     {"s", "sec", "second", "seconds", "ms", "msec", "us", "µs", "μs", "ns", "min", "h"}
 )
@@ -234,6 +237,16 @@ def suggest_name(wanted: str, names: Sequence[str], likeness: float = 0.6) -> st
         longer_names = [name for name in folded if name.startswith(beginning)]
         close = longer_names if len(longer_names) == 1 else []
     return f" (did you mean {folded[close[0]]!r}?)" if close else ""
+
+
+def suggest_file(name: str) -> str:
+    """Return a question that suggests a file or folder with a similar name in the same folder; empty if none is."""
+    folder, wanted = os.path.split(name)
+    try:
+        siblings = os.listdir(folder or ".")  # noqa: PTH208  pathlib would slow down start-up
+    except OSError:
+        return ""
+    return suggest_name(wanted, siblings, _LIKENESS)
 
 
 def clean_text(raw: bytes) -> str:

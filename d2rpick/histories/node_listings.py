@@ -39,7 +39,7 @@ def recognises(head: bytes) -> bool:
 def find_motion(
     databases: Sequence[Legs], listings: Sequence[Source], wanted: set[int]
 ) -> NodeMotion | None:
-    """Return the motion of the wanted nodes from the first source that contains any of them.
+    """Return the motion of the ``wanted`` nodes from the first source that contains any of them.
 
     The result is None if neither the databases nor the node listings of the run contain them, or if their records are
     damaged.
@@ -54,7 +54,7 @@ def find_motion(
 
 
 def _read_database(database: Legs, wanted: set[int]) -> NodeMotion | None:
-    """Return the motion of the wanted nodes that a database contains; None if it contains none of them."""
+    """Return the motion of the ``wanted`` nodes that a database contains; None if it contains none of them."""
     ids = tuple(id_ for id_ in database.node_ids if id_ in wanted)
     if not ids:
         return None
@@ -64,7 +64,7 @@ def _read_database(database: Legs, wanted: set[int]) -> NodeMotion | None:
 def read_listed_nodes(
     sources: Sequence[Source], wanted: Collection[int]
 ) -> NodeMotion | None:
-    """Return the motion of the wanted nodes that all files, the restart segments of one run, contain.
+    """Return the motion of those ``wanted`` nodes that occur in each file; the files are restart segments of one run.
 
     Raises
     ------

@@ -393,19 +393,22 @@ def halve_brackets(
     >>> float(halve_brackets(lambda t: t <= 0.7, np.array(0.0), np.array(1.0), 3))
     0.625
     """
+    shape = within.shape
+    brackets = np.arange(within.size)
     while halvings:
         together = min(halvings, _HALVED_TOGETHER if within.size <= _FEW else 1)
         times = np.stack([within, beyond])
         for _ in range(together):
             times = _insert_middles(times)
-        passed = passes(times)
-        end = np.zeros((1, *within.shape), np.intp)
+        # All brackets are on one axis, because indexing is then several times faster than numpy.take_along_axis.
+        passed = passes(times).reshape(-1, brackets.size)
+        times = times.reshape(-1, brackets.size)
+        end = np.zeros(brackets.size, np.intp)
         for level in reversed(range(together)):
             middle = end + 2**level
-            end = np.where(np.take_along_axis(passed, middle, 0), middle, end)
-        within, beyond = (
-            np.take_along_axis(times, index, 0)[0] for index in (end, end + 1)
-        )
+            end = np.where(passed[middle, brackets], middle, end)
+        within = times[end, brackets].reshape(shape)
+        beyond = times[end + 1, brackets].reshape(shape)
         halvings -= together
     return within
 

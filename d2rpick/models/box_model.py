@@ -119,10 +119,11 @@ class Truss(NamedTuple):
     ) -> Truss:
         """Return straight bars between these points that have the axial stiffness ``axial`` [N] and no stress."""
         pairs = np.array(ends, dtype=np.intp)
-        lengths = np.abs(points[pairs[:, 1]] - points[pairs[:, 0]])
-        return cls(
-            pairs, lengths, axial / lengths, np.full(lengths.size, axial * yield_strain)
-        )
+        first, second = pairs.T
+        lengths = np.abs(points[second] - points[first])
+        stiffness = axial / lengths
+        strength = np.full(lengths.size, axial * yield_strain)
+        return cls(pairs, lengths, stiffness, strength)
 
 
 class Structure(NamedTuple):
@@ -156,26 +157,23 @@ def build_structure(parameters: Parameters) -> Structure:
     upright = np.concatenate([outer, inner, toes]) - toes[0]
     positions = upright * np.exp(-1j * np.radians(p.tilt))
     if p.drop is not None:
-        positions += 1j * (p.drop - p.ground - positions.imag.min())
+        height = p.drop - p.ground - positions.imag.min()
+        positions += 1j * height
     of_box = 2 * cells
-    walls = Truss.between(
-        positions, _list_bars_of_box(cells), p.stiffness, p.yield_strain
-    )
-    walls.strength[_BARS * p.mesh : _BARS * 2 * p.mesh] *= p.roof_strength
     toe_points = of_box + np.arange(toes.size)
+    point_masses = [p.mass / of_box, p.step_mass / toes.size]
+    bars_of_box = _list_bars_of_box(cells)
+    walls = Truss.between(positions, bars_of_box, p.stiffness, p.yield_strain)
+    roof = slice(_BARS * p.mesh, _BARS * 2 * p.mesh)
+    walls.strength[roof] *= p.roof_strength
+    bars_of_step = _list_bars_of_step(cells, top)
+    step = Truss.between(positions, bars_of_step, p.step_stiffness, p.step_yield_strain)
     return Structure(
         places=positions,
-        masses=np.repeat(
-            [p.mass / of_box, p.step_mass / toes.size], [of_box, toes.size]
-        ),
+        masses=np.repeat(point_masses, [of_box, toes.size]),
         of_box=of_box,
         box=walls,
-        step=Truss.between(
-            positions,
-            _list_bars_of_step(cells, top),
-            p.step_stiffness,
-            p.step_yield_strain,
-        ),
+        step=step,
         skin=np.concatenate([np.arange(cells), toe_points]),
         toes=toe_points,
     )
@@ -183,10 +181,12 @@ def build_structure(parameters: Parameters) -> Structure:
 
 def _make_ring(mesh: int) -> Plane:
     """Return points around a square of side 1 about the origin, from its lower leading corner upwards."""
-    side = np.arange(mesh) / mesh - 0.5
-    return np.concatenate(
-        [0.5 + 1j * side, -side + 0.5j, -0.5 - 1j * side, side - 0.5j]
-    )
+    along = np.arange(mesh) / mesh - 0.5
+    leading_side = 0.5 + 1j * along
+    roof = -along + 0.5j
+    trailing_side = -0.5 - 1j * along
+    floor = along - 0.5j
+    return np.concatenate([leading_side, roof, trailing_side, floor])
 
 
 def _scale_ring(ring: Plane, width: float, height: float) -> Plane:
@@ -231,14 +231,18 @@ class Bars:
     """
 
     def __init__(self, truss: Truss, points: int) -> None:
-        self._first, self._second = truss.ends[:, 0].copy(), truss.ends[:, 1].copy()
-        self._stiffness, self._strength = truss.stiffness, truss.strength
+        # Numbers of the first and of the second point of each bar.
+        self._first = truss.ends[:, 0].copy()
+        self._second = truss.ends[:, 1].copy()
+        self._stiffness = truss.stiffness
+        self._strength = truss.strength
         self.rest = truss.rest.copy()
         self.plastic_work = 0.0
         # A bar in tension pulls its first point towards its second point, and its second point towards its first.
-        self._pulls = np.zeros((points, truss.rest.size))
-        self._pulls[self._first, np.arange(truss.rest.size)] = 1.0
-        self._pulls[self._second, np.arange(truss.rest.size)] = -1.0
+        bars = np.arange(truss.rest.size)
+        self._pulls = np.zeros((points, bars.size))
+        self._pulls[self._first, bars] = 1.0
+        self._pulls[self._second, bars] = -1.0
         self.evaluations = 0
 
     def forces(self, positions: Plane) -> Plane:
@@ -254,11 +258,10 @@ class Bars:
             self.plastic_work += float(limited @ flow)
         along *= limited / length
         self.evaluations += length.size
-        return (
-            (self._pulls @ along.view(np.float64).reshape(-1, 2))
-            .view(np.complex128)
-            .ravel()
-        )
+        # The product of real matrices is faster than that of complex ones; the columns are the x and z components.
+        components = along.view(np.float64).reshape(-1, 2)
+        forces = self._pulls @ components
+        return forces.view(np.complex128).ravel()
 
     def elastic_energy(self, positions: Plane, rest: Values | None = None) -> Values:
         """Return the elastic energy of the bars, shape (...), for ``positions`` of shape (..., n) [J].
@@ -267,7 +270,8 @@ class Bars:
         [m].
         """
         length = np.abs(positions[..., self._second] - positions[..., self._first])
-        elongation = length - (self.rest if rest is None else rest)
+        rest_length = self.rest if rest is None else rest
+        elongation = length - rest_length
         return np.asarray(elongation**2 @ self._stiffness) / 2
 
     def internal_energy(
@@ -277,9 +281,9 @@ class Bars:
         plastic_work: Values | None = None,
     ) -> Values:
         """Return the sum of elastic energy and plastic work in the current or a past state, shape (...) [J]."""
-        return self.elastic_energy(positions, rest) + (
-            self.plastic_work if plastic_work is None else plastic_work
-        )
+        if plastic_work is None:
+            return self.elastic_energy(positions, rest) + self.plastic_work
+        return self.elastic_energy(positions, rest) + plastic_work
 
 
 def compute_stiffest_rate(masses: Values, *trusses: Truss, extra: Values) -> float:

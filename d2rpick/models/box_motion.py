@@ -137,16 +137,15 @@ class Contact:
         if self._p.drop is not None:
             return Face(nothing, nothing)
         sliding = (velocities - self.sled.velocity(time)) * self._into_sled
-        floor = self._on_all(
-            self._floor(on_sled[self._skin], sliding[self._skin]), self._skin
-        )
-        curb = self._on_all(
-            self._curb(on_sled[self._toes], sliding[self._toes]), self._toes
-        )
-        back = self._into_sled.conjugate()
-        return Face(
-            (floor.normal + curb.normal) * back, (floor.friction + curb.friction) * back
-        )
+        on_skin = self._floor(on_sled[self._skin], sliding[self._skin])
+        on_toes = self._curb(on_sled[self._toes], sliding[self._toes])
+        floor = self._on_all(on_skin, self._skin)
+        curb = self._on_all(on_toes, self._toes)
+        # Multiplication by this number rotates vectors from the axes of the sled to those of the ground.
+        out_of_sled = self._into_sled.conjugate()
+        normal = (floor.normal + curb.normal) * out_of_sled
+        friction = (floor.friction + curb.friction) * out_of_sled
+        return Face(normal, friction)
 
     def _on_all(self, face: Face, points: Ends) -> Face:
         """Return the forces on selected points as an array for all points, with zero forces on the other points."""
@@ -167,8 +166,10 @@ class Contact:
 
     def _floor(self, positions: Plane, sliding: Plane) -> Face:
         """Return the forces of the floor on the points on the surface of the structure [N]."""
-        above = (positions.real < CURB_THICKNESS) & (positions.imag > -DEEPEST)
-        depth = np.where(above, np.maximum(-positions.imag, 0.0), 0.0)
+        x = positions.real
+        z = positions.imag
+        may_touch = (x < CURB_THICKNESS) & (z > -DEEPEST)
+        depth = np.where(may_touch, np.maximum(-z, 0.0), 0.0)
         return self._with_friction(STIFFNESS * depth, sliding.real)
 
     def _ground(self, positions: Plane, sliding: Plane) -> Face:
@@ -180,13 +181,15 @@ class Contact:
 
     def _curb(self, positions: Plane, sliding: Plane) -> Face:
         """Return the forces of the curb along -x [N], with friction along z; the curb acts like an upright floor."""
-        is_low = positions.imag < self._p.curb
-        is_near = positions.real < self._p.cushion_depth + DEEPEST
-        may_touch = is_low & is_near
-        depth = np.where(may_touch, np.maximum(positions.real, 0.0), 0.0)
-        trial = STIFFNESS * np.maximum(depth - self._crushed, 0.0)
-        yields = np.minimum(trial, self._p.cushion)
-        crushed = self._crushed + (trial - yields) / STIFFNESS
+        x = positions.real
+        z = positions.imag
+        is_low = z < self._p.curb
+        is_near = x < self._p.cushion_depth + DEEPEST
+        depth = np.where(is_low & is_near, np.maximum(x, 0.0), 0.0)
+        # The cushion crushes by as much as lowers its force to the yield force.
+        elastic_force = STIFFNESS * np.maximum(depth - self._crushed, 0.0)
+        limited_force = np.minimum(elastic_force, self._p.cushion)
+        crushed = self._crushed + (elastic_force - limited_force) / STIFFNESS
         self._crushed = np.minimum(crushed, self._p.cushion_depth)
         normal = STIFFNESS * np.maximum(depth - self._crushed, 0.0)
         face = self._with_friction(normal, sliding.imag)
@@ -194,7 +197,9 @@ class Contact:
 
     def _with_friction(self, normal: Values, sliding: Values) -> Face:
         """Return the forces of a floor [N]: ``normal`` upwards, and friction against the velocity ``sliding`` [m/s]."""
-        friction = self._p.friction * normal * sliding / np.hypot(sliding, SLIP)
+        # A smooth sign function of the velocity: v / sqrt(v^2 + SLIP^2).
+        speed = np.hypot(sliding, SLIP)
+        friction = self._p.friction * normal * sliding / speed
         return Face(np.asarray(1j * normal), np.asarray(-friction, dtype=np.complex128))
 
 
@@ -228,11 +233,12 @@ class RigidPoints:
         """Advance velocity and spin by one time step [s] under the forces (n,) [N] on the points and damping [1/s]."""
         # Damping acts on the mean of the velocities before and after the time step.
         half = damping * dt / 2
-        kick = dt * complex(forces.sum()) / self._mass
+        force = complex(forces.sum())
         moment = float(np.vdot(self.arms, forces).imag)
-        turn = dt * moment / self._inertia
-        self.velocity = ((1 - half) * self.velocity + kick) / (1 + half)
-        self.spin = ((1 - half) * self.spin + turn) / (1 + half)
+        velocity_gain = dt * force / self._mass
+        spin_gain = dt * moment / self._inertia
+        self.velocity = ((1 - half) * self.velocity + velocity_gain) / (1 + half)
+        self.spin = ((1 - half) * self.spin + spin_gain) / (1 + half)
 
     def move(self, dt: float) -> None:
         """Move the body by one time step [s]; the arms to the points rotate but keep their lengths."""
@@ -323,9 +329,8 @@ class BoxMotion:
         deformable = self.velocities[points]
         self.body = RigidPoints(masses, self.places[points], deformable)
         rigid = self.body.velocities
-        self.accounts.lost += (
-            float(masses @ (np.abs(deformable) ** 2 - np.abs(rigid) ** 2)) / 2
-        )
+        lost_squares = np.abs(deformable) ** 2 - np.abs(rigid) ** 2
+        self.accounts.lost += float(masses @ lost_squares) / 2
         self.velocities = np.concatenate([rigid, self.velocities[points.stop :]])
 
     def make_deformable(self) -> None:
@@ -341,10 +346,10 @@ class BoxMotion:
         forces = outer
         for bars in self._deformable_bars:
             forces = forces + bars.forces(self.places)
+        # Damping acts on the mean of the velocities before and after the time step.
         half = self.damping * self.dt / 2
-        new_velocities = ((1 - half) * old_velocities + self._mobility * forces) / (
-            1 + half
-        )
+        pushed_velocities = (1 - half) * old_velocities + self._mobility * forces
+        new_velocities = pushed_velocities / (1 + half)
         if self.body:
             points = self._rigid_points
             self.body.push(forces[points], self.damping, self.dt)
@@ -375,16 +380,14 @@ class BoxMotion:
         accounts.impulse += dt * complex((outer - drag).sum())
         accounts.angular_impulse += dt * float(np.vdot(self.places, outer - drag).imag)
         if push:
+            # All powers are in W; the product of force and velocity is the real part of `vdot`.
             speed = self.contact.sled.velocity(self.time)
-            by_sled = float(push.sled.whole.real.sum()) * speed
-            against = float(
-                (
-                    np.vdot(push.sled.friction, mean - speed)
-                    + np.vdot(push.ground.friction, mean)
-                ).real
-            )
-            accounts.external_work += dt * by_sled
-            accounts.friction -= dt * against
-            accounts.walls += dt * (
-                by_sled - float(np.vdot(push.forces, mean).real) + against
-            )
+            power_of_sled = float(push.sled.whole.real.sum()) * speed
+            on_sled = np.vdot(push.sled.friction, mean - speed)
+            on_ground = np.vdot(push.ground.friction, mean)
+            power_of_friction = float((on_sled + on_ground).real)
+            power_on_points = float(np.vdot(push.forces, mean).real)
+            accounts.external_work += dt * power_of_sled
+            accounts.friction -= dt * power_of_friction
+            power_into_walls = power_of_sled - power_on_points + power_of_friction
+            accounts.walls += dt * power_into_walls

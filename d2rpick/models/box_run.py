@@ -91,46 +91,39 @@ class Record(NamedTuple):
     def energy_ratio(self) -> Values:
         """Ratio of the total energy to the initial energy plus external work, shape (n,) [-]; 1 if both are 0."""
         reference = self.total_energy[0] + self.external_work - self.external_work[0]
-        return np.asarray(
-            np.divide(
-                self.total_energy,
-                reference,
-                out=1 + 0 * reference,
-                where=reference != 0,
-            )
-        )
+        ratios = 1 + 0 * reference
+        np.divide(self.total_energy, reference, out=ratios, where=reference != 0)
+        return np.asarray(ratios)
 
     @property
     def imbalance(self) -> Values:
         """Error of the energy balance as a fraction of the largest total energy, shape (n,) [-]."""
         total = self.total_energy + self.lost_energy
-        return np.asarray(
-            (total - total[0] - self.external_work + self.external_work[0])
-            / np.abs(total).max()
-        )
+        error = total - total[0] - self.external_work + self.external_work[0]
+        return np.asarray(error / np.abs(total).max())
 
 
 class Recorder:
     """Collects the states of a ``motion`` up to its time step ``last``."""
 
     def __init__(self, motion: BoxMotion, last: int) -> None:
-        self._motion, self._began, self._updates = (
-            motion,
-            perf_counter(),
-            _count_updates(motion),
-        )
+        self._motion = motion
+        self._began = perf_counter()
+        self._updates = _count_updates(motion)
         s = motion.structure
-        states = last // motion.every - -(-motion.count // motion.every) + 1
-        self._reals = np.zeros((states, _REALS))
-        self._planes = np.zeros((states, _PLANES), dtype=np.complex128)
-        self._outline = np.zeros((states, s.of_box // 2), dtype=np.complex128)
+        first_state = -(-motion.count // motion.every)
+        state_count = last // motion.every - first_state + 1
+        self._reals = np.zeros((state_count, _REALS))
+        self._planes = np.zeros((state_count, _PLANES), dtype=np.complex128)
+        self._outline = np.zeros((state_count, s.of_box // 2), dtype=np.complex128)
         self._next = 0
         self._box_masses = s.masses[: s.of_box]
         self._box_mass = float(self._box_masses.sum())
         self._start = self._box_masses * self._arms(s.places)
-        self._places, self._means = np.zeros(
-            (2, _BLOCK, s.places.size), dtype=np.complex128
-        )
+        # States of the current block, from which the results are computed together.
+        block_shape = (_BLOCK, s.places.size)
+        self._places = np.zeros(block_shape, dtype=np.complex128)
+        self._means = np.zeros(block_shape, dtype=np.complex128)
         self._rests = [
             np.zeros((_BLOCK, bars.rest.size)) for bars in (motion.box, motion.step)
         ]
@@ -140,8 +133,11 @@ class Recorder:
         motion = self._motion
         accounts = self._motion.accounts
         at = self._next % _BLOCK
-        self._places[at], self._means[at] = motion.places, mean
-        self._rests[0][at], self._rests[1][at] = motion.box.rest, motion.step.rest
+        self._places[at] = motion.places
+        self._means[at] = mean
+        rests_of_box, rests_of_step = self._rests
+        rests_of_box[at] = motion.box.rest
+        rests_of_step[at] = motion.step.rest
         self._reals[self._next] = (
             motion.time, 0.0, 0.0, motion.box.plastic_work, motion.step.plastic_work, 0.0, 0.0, accounts.external_work,
             accounts.friction, accounts.walls, accounts.damping, accounts.lost,
@@ -159,21 +155,27 @@ class Recorder:
         positions = self._places[:count]
         means = self._means[:count]
         momenta = s.masses * means
-        arms = self._arms(positions)
+        momenta_in_box = momenta[:, :n]
+        momentum_of_box = momenta_in_box.sum(axis=1)
+        momentum_of_step = momenta[:, n:].sum(axis=1)
         kinetic = (np.conj(means) * momenta).real / 2
-        of_box = momenta[:, :n].sum(axis=1)
-        of_step = momenta[:, n:].sum(axis=1)
-        spin = (np.conj(arms) * momenta[:, :n]).imag.sum(axis=1)
+        arms = self._arms(positions)
+        # conj(a) b is the scalar product of the vectors a and b, plus i times their cross product.
+        angular_momentum = (np.conj(arms) * momenta_in_box).imag.sum(axis=1)
+        inertia = np.abs(arms) ** 2 @ self._box_masses
+        # The rows are those that `record` reads: time, roll, angular velocity, and energies.
         reals = self._reals[states].T
         reals[1] = np.angle(np.conj(arms) @ self._start)
-        reals[2] = -spin / (np.abs(arms) ** 2 @ self._box_masses)
+        reals[2] = -angular_momentum / inertia
         trusses = zip((self._motion.box, self._motion.step), self._rests, strict=True)
         for row, (bars, rest) in enumerate(trusses, start=3):
             reals[row] = bars.internal_energy(positions, rest[:count], reals[row])
-        reals[5], reals[6] = kinetic[:, :n].sum(axis=1), kinetic[:, n:].sum(axis=1)
+        reals[5] = kinetic[:, :n].sum(axis=1)
+        reals[6] = kinetic[:, n:].sum(axis=1)
         centre = positions[:, 0] - arms[:, 0]
+        velocity = momentum_of_box / self._box_mass
         self._planes[states] = np.stack(
-            [centre, of_box / self._box_mass, of_box, of_step], axis=1
+            [centre, velocity, momentum_of_box, momentum_of_step], axis=1
         )
         self._outline[states] = positions[:, : n // 2]
 
@@ -217,9 +219,8 @@ class Recorder:
     def _arms(self, positions: Plane) -> Plane:
         """Return the vectors from the centre of mass of the box to its points, shape (..., points of the box) [m]."""
         of_box = positions[..., : self._box_masses.size]
-        return np.asarray(
-            of_box - (of_box @ self._box_masses / self._box_mass)[..., np.newaxis]
-        )
+        centre = of_box @ self._box_masses / self._box_mass
+        return np.asarray(of_box - centre[..., np.newaxis])
 
 
 def _count_updates(motion: BoxMotion) -> int:
@@ -328,9 +329,10 @@ class BoxEvidence(Given):
 def make_history(record: Record) -> History:
     """Return the history of the box energy, with the momenta and energies of both parts."""
     parts = tuple(Part(number, title) for number, title in enumerate(PARTS, start=1))
-    momentum = np.stack(
-        [record.momentum.real, 0 * record.momentum.real, record.momentum.imag], axis=2
-    )
+    along_x = record.momentum.real
+    along_z = record.momentum.imag
+    momentum = np.stack([along_x, 0 * along_x, along_z], axis=2)
+    momenta = Momenta(record.time, momentum, parts, EXACT, chosen=(BOX,))
     return History(
         time=record.time,
         energy=record.internal_energy[:, BOX],
@@ -339,7 +341,7 @@ def make_history(record: Record) -> History:
         channel="internal energy of box",
         parts=parts[:1],
         evidence=BoxEvidence(
-            (Momenta(record.time, momentum, parts, EXACT, chosen=(BOX,)),),
+            (momenta,),
             part_energies=Track(record.time, record.internal_energy),
         ),
         time_unit="s",
@@ -376,10 +378,9 @@ def scan_times(released: float, td: float) -> list[float]:
         raise RangeError(
             f"td {td:g} leaves no time for tr; the earliest possible td is {_FINE + _LAST:g}"
         )
-    return [
-        *np.arange(_FINE, dense, _FINE).tolist(),
-        *np.arange(dense, td - _LAST, _COARSE).tolist(),
-    ]
+    fine = np.arange(_FINE, dense, _FINE)
+    coarse = np.arange(dense, td - _LAST, _COARSE)
+    return [*fine.tolist(), *coarse.tolist()]
 
 
 def find_comparison_end(reference: Record, td: float) -> float:

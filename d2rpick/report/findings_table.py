@@ -9,7 +9,7 @@ import os
 from collections import Counter
 from typing import TYPE_CHECKING, Final
 
-from d2rpick.base.errors import make_printable, name_units
+from d2rpick.base.errors import list_names, make_printable, name_units
 from d2rpick.base.files import STDIN
 from d2rpick.choice.pair.grades import POOR
 from d2rpick.deck.beside import find_history_beside
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from d2rpick.rules.base import Finding, Unreadable
 
     class Checks(Protocol):
-        """What the output formats show of the findings in several decks."""
+        """Findings in several decks, with the attributes that the output formats use."""
 
         # Mark of a dataclass, of which `dataclasses.replace` makes changed copies.
         __dataclass_fields__: ClassVar[dict[str, Any]]
@@ -60,6 +60,9 @@ if TYPE_CHECKING:
             """True if the windows were judged by the energies of their parts."""
 
 
+# Largest number of rules that are named above the findings in several decks, and of decks without findings below them.
+_MOST_RULES: Final = 3
+_MOST_SILENT: Final = 8
 # Nouns for the severities error, warning and info.
 _NOUNS: Final = ("error", "warning", "info message")
 # Name of the switched run in a command if the user has to give it.
@@ -74,27 +77,105 @@ _NOT_JUDGED: Final = "not judged by time"
 def as_table(checks: Checks, display: DisplayOptions) -> str:
     """Return one line per finding and per window of each deck, the numbers of findings and decks, and the next step.
 
-    Below a plan with which the deck was written, the plan gives the next step.
+    Several decks begin with the decision and the next step, followed by the decks from the worst to the best; decks
+    without windows and findings are only listed. Below a plan with which the deck was written, the plan gives the next
+    step.
     """
-    lines: list[str] = []
-    for result in checks.results:
-        lines.append(format_path(result.deck, checks.root))
-        if _switches_at_unknown_times(result):
-            lines.append(
-                "  switches itself by forces or sensors of the run; its times are not judged"
-            )
-        elif not result.cards and not result.windows:
-            lines.append("  no switching cards")
-        elif not result.windows and not result.findings:
-            lines.append("  switching cards that switch nothing")
-        lines += [f"  {line}" for line in _format_windows(result.windows, checks.root)]
-        lines += [
-            f"  {format_finding(finding)}" for finding in list_findings(checks, result)
-        ]
+    if len(checks.results) > 1:
+        return _format_many_decks(checks)
+    lines = [line for result in checks.results for line in _format_deck(checks, result)]
     step = [] if display.written_deck else [f"next  {_name_next_step(checks)}"]
     return "\n".join(
         [*map(make_printable, lines), "", *step, summarize_findings(checks)]
     )
+
+
+def _format_many_decks(checks: Checks) -> str:
+    """Return the decision on several decks and the next step, the decks from the worst to the best, and a summary."""
+    head = [*_list_decision(checks), ("next", _name_next_step(checks))]
+    silent = [
+        format_path(result.deck, checks.root)
+        for result in checks.results
+        if not result.windows and not result.findings
+    ]
+    lines = [
+        line
+        for result in sorted(checks.results, key=_rank_worst_finding)
+        if result.windows or result.findings
+        for line in _format_deck(checks, result)
+    ]
+    if silent:
+        decks = f"{len(silent)} deck{'s' * (len(silent) > 1)}"
+        names = list_names(silent, most=_MOST_SILENT)
+        lines += ["", f"no findings in {decks} without rigid windows: {names}"]
+    return "\n".join(
+        [
+            *tables.format_in_line(head),
+            "",
+            *map(make_printable, lines),
+            "",
+            summarize_findings(checks),
+        ]
+    )
+
+
+def _list_decision(checks: Checks) -> list[tuple[str, str]]:
+    """Return how many of several decks have errors or warnings, and which rules report most of them."""
+    serious = {
+        severity: [
+            result
+            for result in checks.results
+            if any(finding.severity is severity for finding in result.findings)
+        ]
+        for severity in (Severity.ERROR, Severity.WARNING)
+    }
+    total = len(checks.results)
+    for severity, decks in serious.items():
+        if decks:
+            rules = Counter(
+                finding.rule
+                for result in decks
+                for finding in result.findings
+                if finding.severity is severity
+            )
+            counted = [
+                f"{_summarize(rule)} ({rule}{f', {count} times' if count > 1 else ''})"
+                for rule, count in rules.most_common()
+            ]
+            return [
+                (f"{severity}s", f"in {len(decks)} of {total} decks"),
+                *(("why", text) for text in counted[:_MOST_RULES]),
+            ]
+    return [("passed", f"no errors or warnings in {total} decks")]
+
+
+def _summarize(rule: str) -> str:
+    """Return what a rule finds, in a few words."""
+    # Imported here, because a single deck is checked in the time that the imports take.
+    from d2rpick.rules import RULES
+
+    return RULES[rule].summary
+
+
+def _rank_worst_finding(result: Checked) -> int:
+    """Return the rank of the worst finding in a deck, for sorting; a deck without findings comes last."""
+    ranks = [finding.severity.rank for finding in result.findings]
+    return min(ranks, default=len(Severity))
+
+
+def _format_deck(checks: Checks, result: Checked) -> Iterator[str]:
+    """Yield the name of a deck, its rigid windows, and its findings, one in a line."""
+    yield format_path(result.deck, checks.root)
+    if _switches_at_unknown_times(result):
+        yield "  switches itself by forces or sensors of the run; its times are not judged"
+    elif not result.cards and not result.windows:
+        yield "  no switching cards"
+    elif not result.windows and not result.findings:
+        yield "  no part becomes rigid, although the deck has switching cards"
+    for line in _format_windows(result.windows, checks.root):
+        yield f"  {line}"
+    for finding in list_findings(checks, result):
+        yield f"  {format_finding(finding)}"
 
 
 def _switches_at_unknown_times(result: Checked) -> bool:
@@ -126,7 +207,7 @@ def _name_next_step(checks: Checks) -> str:
         return (
             f"correct what the lines above report; {explain} explains the worst of them"
         )
-    decks = tables.make_positional([result.deck for result in checks.results])
+    switching = [result for result in checks.results if result.windows]
     itself = next(filter(_switches_at_unknown_times, checks.results), None)
     if itself:
         folder = tables.make_positional([os.path.dirname(itself.deck) or os.curdir])  # noqa: PTH120  a name with a NUL byte has no folder
@@ -134,7 +215,10 @@ def _name_next_step(checks: Checks) -> str:
         return (
             f"run the deck; {follow} shows meanwhile when the parts fly and are rigid"
         )
-    if not any(result.cards for result in checks.results):
+    has_cards = any(result.cards for result in checks.results)
+    if not has_cards or not any(
+        result.windows or result.findings for result in checks.results
+    ):
         found, hint = _name_history(checks)
         plan = tables.quote_shell_line(("d2rpick", "plan", *found))
         return f"if the run is to be switched, choose the times with {plan}{hint}, and add the cards to the deck"
@@ -143,6 +227,7 @@ def _name_next_step(checks: Checks) -> str:
         return f"no card has a time that a history can judge; {explain} says how to have such switches judged"
     if checks.history is None:
         # The history next to a deck that switches may be that of the switched run.
+        decks = tables.make_positional([result.deck for result in switching])
         command = tables.quote_shell_line(("d2rpick", "check", *decks))
         hint = f"(history of the reference run instead of {_SOME_HISTORY})"
         return f"judge the times by the reference run: {command} --history {_SOME_HISTORY} {hint}"
@@ -171,7 +256,9 @@ def _name_next_step(checks: Checks) -> str:
 
 
 def _name_history(checks: Checks) -> tuple[tuple[str, ...], str]:
-    """Return the history next to the only deck or, if there is none, a placeholder, and a hint to replace it."""
+    """Return the given history or the one next to the only deck, otherwise a placeholder and a hint to replace it."""
+    if checks.history:
+        return tables.make_positional(checks.history), ""
     decks = [result.deck for result in checks.results]
     history = find_history_beside(decks[0]) if len(decks) == 1 else None
     if history:

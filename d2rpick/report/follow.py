@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 from itertools import chain, pairwise
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.errors import list_names
 from d2rpick.histories.listings import WITH_AN_ERROR
+from d2rpick.histories.names import suggest_file
 from d2rpick.report.tables import make_positional, quote_shell_line
 from d2rpick.running.watch import News
 
@@ -175,7 +177,8 @@ def _describe_end(news_before: News, news: News, plan: str) -> Iterator[Event]:
 def _describe_last_state(news: News, names: Sequence[str], plan: str) -> Event:
     """State whether the parts are flying now, and since when; ``plan`` is the next command if the run is over."""
     if news.now is None:
-        message = f"{list_names(names)}: no file of a run yet; check the name if the run has begun"
+        similar = "" if any(map(os.path.exists, names)) else suggest_file(names[0])
+        message = f"{list_names(names)}: no file of a run yet{similar}; check the name if the run has begun"
         if news.error:
             message = f"cannot be read yet: {news.error}"
         return Event("state", None, None, message)

@@ -5,14 +5,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.errors import COPY_AGAIN, list_names
+from d2rpick.base.options import make_option_name
+from d2rpick.choice.options import list_uses
 from d2rpick.choice.pair.grades import DO_NOT_USE
-from d2rpick.deck.beside import find_deck_beside
+from d2rpick.deck.beside import SOME_NODES, SOME_PARTS, find_deck_beside
 from d2rpick.report.tables import make_positional, quote_shell_line
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from d2rpick.choice.answers import PairSuggestion
     from d2rpick.choice.pair.candidates import Pair
     from d2rpick.choice.pair.decision import Decision
     from d2rpick.choice.pair.situation import Situation
@@ -21,24 +22,23 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History
     from d2rpick.report.formats import RepeatedQuestion
 
-# Placeholder ids in a command if the user has to name the parts or the nodes, because no file contains them.
-_SOME_PART: Final = "1"
-_SOME_NODE: Final = "1001"
 # Placeholders for the main deck in a command if the user has to name it, and for the folder of its copy.
 _SOME_DECK: Final = "DECK"
+# Largest number of main nodes of a deck that are named in a hint.
+_MOST_NODES: Final = 8
 _SOME_HISTORY: Final = "HISTORY"
+# Placeholder for the files of a reference run in a command that compares it with a switched run.
+_SOME_REFERENCE: Final = "REFERENCE"
 _FOLDER: Final = "switched"
 # Word for the parts that fly together, as in `d2rpick.flight.momentum`, which is slow to import.
 _FLYING: Final = "flying"
 # Statement of the last step, when the pairs of all flights have been compared.
 _NO_PAIR: Final = "no pair of this run can be used"
-# Options that can be the reason why no pair can be used.
-_LIMITS: Final = (
+# Options that can be the reason why no pair can be used, besides those that set a limit.
+_OTHER_LIMITS: Final = (
     "--after",
     "--landing",
     "--margin",
-    "--max-kinetic-share",
-    "--max-residual",
     "--min-quality",
     "--min-rigid",
     "--tolerance",
@@ -48,11 +48,6 @@ _NEEDS_DECK: Final = (
     f"main deck of the run instead of {_SOME_DECK}; "
     "without it, parts that share nodes become separate rigid bodies"
 )
-
-
-def choose_example_id(kind: str) -> str:
-    """Return a placeholder for the ids of parts ("part") or nodes ("node") that runs as it stands."""
-    return _SOME_NODE if kind == "node" else _SOME_PART
 
 
 class NamedDeck(NamedTuple):
@@ -140,14 +135,15 @@ def name_step_to_card(
     hint = ""
     # The deck names the main nodes of the rigid bodies that contain the parts.
     if is_radioss and not (history.parts and settings.bodies is not None):
-        words = (*words, "--node", _SOME_NODE)
-        hint = f" (main nodes of your rigid bodies instead of {_SOME_NODE})"
+        more_words, hint = _name_bodies(history, question)
+        words = (*words, *more_words)
+        question = _allow_deck(question)
     elif not history.parts:
-        words = (*words, "--part", _SOME_PART)
+        words = (*words, "--part", SOME_PARTS)
         of_radioss = ""
         if not names_solver(history.format):
-            of_radioss = f"; for a Radioss run, --solver radioss --node {_SOME_NODE} instead of --part {_SOME_PART}"
-        hint = f" (ids of your parts instead of {_SOME_PART}; add --merge ID if parts share nodes{of_radioss})"
+            of_radioss = f"; for a Radioss run, --solver radioss --node {SOME_NODES} instead of --part {SOME_PARTS}"
+        hint = f" (ids of your parts instead of {SOME_PARTS}; add --merge ID if parts share nodes{of_radioss})"
     elif needs_deck(history, settings):
         deck = name_deck_of_run(question, _NEEDS_DECK)
         words = (*words, "--deck", deck.name)
@@ -159,6 +155,28 @@ def name_step_to_card(
     else:
         line = write_command(question, command, *words)
     return f"print the cards with {line}{hint}"
+
+
+def _name_bodies(
+    history: History, question: RepeatedQuestion
+) -> tuple[tuple[str, ...], str]:
+    """Return the options that name the rigid bodies on a card for Radioss, and a hint to replace a placeholder.
+
+    The deck next to the history names the bodies of chosen parts. If no part is chosen, its only body is switched.
+    """
+    from d2rpick.deck.suiting import list_main_nodes
+
+    is_excluded = "--no-deck" in question.options
+    deck = None if is_excluded else find_deck_beside(history.source)
+    if deck and question.parts and "--deck" not in question.options:
+        return ("--deck", deck), ""
+    nodes = list_main_nodes(deck) if deck else ()
+    if len(nodes) == 1:
+        return ("--node", str(nodes[0])), ""
+    hint = f"main nodes of your rigid bodies instead of {SOME_NODES}"
+    if nodes:
+        hint += f"; the deck has {list_names([*map(str, nodes)], most=_MOST_NODES)}"
+    return ("--node", SOME_NODES), f" ({hint})"
 
 
 def name_step_with_pair(
@@ -241,21 +259,66 @@ def ask_for_states_that_show_flight(states: int, start: float, end: float) -> st
 def name_lack_of_pairs(question: RepeatedQuestion) -> str:
     """Return the statement that no pair of the run can be used, with the given options that may be the reason."""
     words = (*question.times, *question.options)
-    limits = [
-        f"{name} {words[words.index(name) + 1]}" for name in _LIMITS if name in words
+    options_with_limit = [
+        f"--{make_option_name(name)}" for name, use in list_uses().items() if use.limit
     ]
+    names = sorted({*_OTHER_LIMITS, *options_with_limit})
+    limits = [
+        f"{name} {words[words.index(name) + 1]}" for name in names if name in words
+    ]
+    # This value accepts every pair, so no other value allows more.
+    limits = [limit for limit in limits if limit != "--min-quality poor"]
     if not limits:
         return _NO_PAIR
     values = "another value" if len(limits) == 1 else "other values"
     return f"{_NO_PAIR} with {list_names(limits)} ({values} may allow one)"
 
 
-def name_way_out_of_run(answer: PairSuggestion, question: RepeatedQuestion) -> str:
+def name_step_after_flight(
+    situation: Situation, decision: Decision | None, question: RepeatedQuestion
+) -> str:
+    """Return the step after a comparison of all td of a flight, none of which has a usable pair.
+
+    It leads to the other flights or, if there are none, out of the run; without any flight, to the lacking output.
+    """
+    # Imported here to keep start-up fast.
+    from d2rpick.choice.td.flights import has_other_flights
+
+    if situation.flight.start is None:
+        return name_step_without_flight(situation.history, question)
+    if has_other_flights(situation.history, situation.settings, situation.td):
+        line = write_command(question, "plan")
+        return (
+            f"no pair of this flight can be used; compare the other flights with {line}"
+        )
+    return name_way_out_of_run(situation, decision, question)
+
+
+def name_step_without_flight(history: History, question: RepeatedQuestion) -> str:
+    """Return the step if no flight is found; the end of the load is asked for unless the momentum shows no flight."""
+    # Imported here, because a card without a history needs no numpy.
+    from d2rpick.flight.flight import NEVER_FLIES, denies_every_flight
+
+    more = ask_for_states_that_show_flight(
+        history.time.size, history.start, history.end
+    )
+    line = write_command(question, "info")
+    look = f"see what the run has to write with {line}"
+    if not denies_every_flight(history):
+        return f"{more}{look}, or give the end of the load as --after"
+    no_pair = f"{more}{name_lack_of_pairs(question)}: {NEVER_FLIES}"
+    if any(momenta.parts for momenta in history.momenta):
+        return f"{no_pair}; run it without switching"
+    return f"{no_pair}; to find out whether single parts fly, {look}"
+
+
+def name_way_out_of_run(
+    situation: Situation, decision: Decision | None, question: RepeatedQuestion
+) -> str:
     """Return the step after a comparison of all flights in which no pair can be used.
 
     It leads to other parts or to a change of the input, never to another comparison of the same pairs.
     """
-    situation = answer.situation
     is_chosen = question.parts or "--energy" in question.options
     no_pair = name_lack_of_pairs(question)
     if situation.flight.by_parts and not is_chosen:
@@ -263,13 +326,46 @@ def name_way_out_of_run(answer: PairSuggestion, question: RepeatedQuestion) -> s
         return (
             f"{no_pair} with all parts; judge the parts that fly together with {line}"
         )
-    cure = answer.decision.cure_without_other_times if answer.decision else ""
+    cure = decision.cure_without_other_times if decision else ""
     if cure:
-        return f"{no_pair}: {cure}"
+        return f"{no_pair}: {cure}{_name_way_to_switched_run(cure, question)}"
     if situation.history.parts:
         line = write_command(question._replace(parts=()), "parts")
         return f"{no_pair} with these parts; find other parts with {line}"
     return f"{no_pair}: run it without switching, or make other parts rigid"
+
+
+def name_step_after_switched_run(question: RepeatedQuestion) -> str:
+    """Return the step after a plan of a finished switched run in which no further window can be used."""
+    switched = [text for name in question.files for text in ("--switched", name)]
+    words = ("d2rpick", "verify", *switched, *question.parts, _SOME_REFERENCE)
+    hint = f"the reference run instead of {_SOME_REFERENCE}"
+    return (
+        f"compare this run with its reference run: {quote_shell_line(words)} ({hint})"
+    )
+
+
+def _name_way_to_switched_run(cure: str, question: RepeatedQuestion) -> str:
+    """Return the command that writes the deck of a switched run if a ``cure`` asks for one; otherwise ""."""
+    # Imported here, because a card without a history needs no numpy.
+    from d2rpick.choice.pair.quality import COMPARE
+
+    if COMPARE not in cure or not question.parts:
+        return ""
+    deck = name_deck_of_run(question)
+    given = () if "--deck" in question.options else ("--deck", deck.name)
+    words = (*given, "--min-quality", "poor", "--write-deck", _FOLDER)
+    options = _leave_out(question.options, "--min-quality")
+    line = write_command(question._replace(options=options), "plan", *words)
+    return f". This writes the deck of such a run: {line}{deck.hint if given else ''}"
+
+
+def _leave_out(words: Sequence[str], name: str) -> tuple[str, ...]:
+    """Return the words of a command without an option and its value."""
+    if name not in words:
+        return tuple(words)
+    position = words.index(name)
+    return (*words[:position], *words[position + 2 :])
 
 
 def name_step_after_refusal(

@@ -11,7 +11,11 @@ from d2rpick.flight import SOURCES
 from d2rpick.flight.flight import NEVER_FLIES
 from d2rpick.report import keys, tables
 from d2rpick.report.fields import Document, Field, get_kind, many, maybe, one_of, row
-from d2rpick.report.next_step import ask_for_states_that_show_flight
+from d2rpick.report.formats import RepeatedQuestion
+from d2rpick.report.next_step import (
+    ask_for_states_that_show_flight,
+    name_step_after_switched_run,
+)
 from d2rpick.report.situation import (
     list_health_columns,
     list_health_measures,
@@ -96,12 +100,16 @@ DOCUMENT: Final = Document("d2rpick/info/1", "Answer of d2rpick info; times in t
 # Largest number of contact times that are listed if a contact acts often.
 _MOST_TIMES: Final = 4
 _PARTS_HEAD = ("part", "title", "highest internal energy")
-# What to do with the record. The verdict on a pair uses the same words, so the sentence names the record.
+# Whether times can be chosen from the record. The verdict on a pair uses similar words, so the sentence names the
+# record, and leaves the verdict on its windows to `plan`.
 _RECORD: Final = {
-    USE: "use it to choose times",
-    USE_WITH_CARE: "use it with care to choose times",
+    USE: "can be used to choose times: it has flights, and d2rpick plan judges their windows",
+    USE_WITH_CARE: "can be used with care to choose times: it has flights, and d2rpick plan judges their windows",
     DO_NOT_USE: "do not use it to choose times",
 }
+_NOT_JUDGED: Final = (
+    "cannot be judged until the column with the internal energy is chosen"
+)
 # Advice if momenta are written but show no flight.
 _GIVE_END_OF_LOAD: Final = "if you know that the parts fly after a load, give its end to d2rpick plan with --after"
 # Advice if the momenta that are written exclude every flight.
@@ -150,10 +158,16 @@ def as_table(overview: Overview, display: DisplayOptions) -> str:
 
 def list_overview_lines(overview: Overview) -> list[tuple[str, str]]:
     """Return whether the run can be used, why, its flights, and the next command, as (name, sentence) pairs."""
-    lines = [("record", _RECORD[overview.verdict]), ("why", overview.reason)]
+    record = _NOT_JUDGED if overview.energies else _RECORD[overview.verdict]
+    lines = [("record", record), ("why", overview.reason)]
     lines += [("flight", _format_flight(*flight)) for flight in overview.flights]
+    if overview.energies:
+        return [*lines, ("next", _name_step_to_energy(overview))]
     if overview.verdict == DO_NOT_USE:
         is_known = overview.unjudged or overview.rigid
+        if overview.rigid and not overview.unjudged:
+            question = RepeatedQuestion(files=overview.source)
+            return [*lines, ("next", name_step_after_switched_run(question))]
         if is_known:
             return lines
         if overview.is_loaded:
@@ -171,6 +185,15 @@ def list_overview_lines(overview: Overview) -> list[tuple[str, str]]:
     command = ["d2rpick", "plan", *which, *deck]
     command += tables.make_positional(overview.source)
     return [*lines, ("next", tables.quote_shell_line(command))]
+
+
+def _name_step_to_energy(overview: Overview) -> str:
+    """Return the command that judges the first of the columns that may contain the internal energy."""
+    first, *others = overview.energies
+    files = tables.make_positional(overview.source)
+    line = tables.quote_shell_line(("d2rpick", "info", "--energy", first, *files))
+    hint = f" (or another column instead of {first}: {', '.join(others)})"
+    return f"{line}{hint if others else ''}"
 
 
 def _ask_for_states(overview: Overview) -> str:

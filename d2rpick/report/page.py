@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base import __version__
 from d2rpick.choice.pair.grades import DO_NOT_USE, USE, USE_WITH_CARE
+from d2rpick.deck.beside import SOME_NODES, SOME_PARTS
 from d2rpick.deck.printing import DEFAULT, SOLVERS
 from d2rpick.report.decision import list_verdict_lines
-from d2rpick.report.next_step import choose_example_id
 from d2rpick.report.situation import list_health_measures, list_situation_heading
 from d2rpick.report.tables import Cell, format_short, quote_shell_line
 
@@ -70,10 +70,14 @@ class Markup(str):
 
 
 class PageSection(Markup):
-    """A section of a page, with its title and the id to which the table of contents links."""
+    """A section of a page, with its title and the id to which the table of contents links.
+
+    A section that ``needs_script`` is hidden until its script runs, and so is its link.
+    """
 
     name: str
     anchor: str
+    needs_script: bool = False
 
 
 def make_element(name: str, /, *children: str, **attributes: str) -> Markup:
@@ -181,14 +185,21 @@ def build_section(title: str, *content: str) -> PageSection:
     return _make_section(title, make_element("h2", title), *content)
 
 
+def name_section(
+    content: Markup, title: str, anchor: str, *, needs_script: bool = False
+) -> PageSection:
+    """Return markup as a section to which the table of contents links."""
+    section = PageSection(content)
+    section.name, section.anchor = title, anchor
+    section.needs_script = needs_script
+    return section
+
+
 def _make_section(title: str, *content: str) -> PageSection:
     """Return a section with an id made from its title."""
     letters = (letter if letter.isalnum() else "-" for letter in title.casefold())
     anchor = f"section-{''.join(letters)}"
-    section = PageSection(make_element("section", *content, id=anchor))
-    section.name = title
-    section.anchor = anchor
-    return section
+    return name_section(make_element("section", *content, id=anchor), title, anchor)
 
 
 def build_contents(content: Iterable[str]) -> Markup:
@@ -197,7 +208,11 @@ def build_contents(content: Iterable[str]) -> Markup:
     if len(sections) < _LONG:
         return Markup()
     links = (
-        make_element("li", make_element("a", section.name, href=f"#{section.anchor}"))
+        make_element(
+            "li",
+            make_element("a", section.name, href=f"#{section.anchor}"),
+            class_="of-script" if section.needs_script else "of-page",
+        )
         for section in sections
     )
     return make_element(
@@ -536,7 +551,7 @@ def _list_solver_input(
     command = ["d2rpick", "card", "--tr", repr(times[0]), "--td", repr(times[1])]
     command += [] if solver == DEFAULT else ["--solver", solver]
     kind = SOLVERS[solver].switches
-    example = choose_example_id(kind)
+    example = SOME_NODES if kind == "node" else SOME_PARTS
     line = make_element(
         "pre",
         quote_shell_line([*command, f"--{kind}", example, *record.judging]),
@@ -544,8 +559,11 @@ def _list_solver_input(
     )
     title = _SWITCHED[kind]
     return (
-        make_element("p", f"Put the ids of your {title} in place of {example}."),
-        make_element("p", "Printed, and judged again as printed, by"),
+        make_element(
+            "p",
+            f"No file of this answer names the {title} to be switched. In the command below, put their ids in place of "
+            f"{example}; it prints the card and judges its times.",
+        ),
         line,
     )
 

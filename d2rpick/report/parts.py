@@ -6,7 +6,6 @@ from math import isinf
 from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.base.errors import format_ranges, list_names, make_printable
-from d2rpick.choice.pair.grades import DO_NOT_USE
 from d2rpick.deck.engine_files import CAP_SHARE
 from d2rpick.report import keys, tables
 from d2rpick.report.decision import (
@@ -205,6 +204,8 @@ _SPARE: Final = (
     "rotation error [deg]",
     "energy scatter",
 )
+# Advice if the history contains no parts.
+_NAME_HISTORY_WITH_PARTS: Final = "name a history with parts: matsum or binout of LS-DYNA, T01 of Radioss with /TH/PART"
 # Displayed verdicts on parts, keyed by verdict.
 _VERDICTS: Final = {"switch": "yes", "keep": "no"}
 # Displayed names of the sets, keyed by set name.
@@ -445,6 +446,11 @@ def name_verdict(row: PartRow) -> str:
 def list_verdict_on_set(answer: Parts) -> list[tuple[str, str]]:
     """Return which parts to make rigid, why, and what that saves, as (name, sentence) pairs."""
     best = answer.recommended
+    if best is None and not answer.files.parts:
+        return [
+            ("make rigid", "unknown: this history does not contain single parts"),
+            ("to improve", _NAME_HISTORY_WITH_PARTS),
+        ]
     if best is None and answer.inventory is None:
         return [
             (
@@ -486,24 +492,47 @@ def list_verdict_on_set(answer: Parts) -> list[tuple[str, str]]:
 
 
 def list_next_step(answer: Parts, question: RepeatedQuestion) -> list[tuple[str, str]]:
-    """Return the next command: ``plan`` with the recommended set, or ``explore`` if the pair of the set is unusable."""
+    """Return the next command: ``plan`` with the recommended set; without a usable set, a step to something else."""
     best = answer.recommended
     if best is None:
         return [("next", _name_step_without_set(answer, question))]
+    if is_refused(best.decision):
+        return [("next", _name_step_after_refused_set(best, question))]
     parts = [format_part_ranges(best.parts)]
-    is_refused = best.decision is not None and best.decision.verdict == DO_NOT_USE
-    command = "explore" if is_refused else "plan"
-    return [("next", write_command(question, command, new_parts=parts))]
+    return [("next", write_command(question, "plan", new_parts=parts))]
+
+
+def _name_step_after_refused_set(best: PartSet, question: RepeatedQuestion) -> str:
+    """Return the step if even the best set cannot be used: to other times, or out of the run if all are compared."""
+    # Imported here to keep start-up fast.
+    from d2rpick.choice.td.flights import has_other_flights
+
+    assert best.decision is not None
+    assert best.situation is not None
+    situation = best.situation
+    plan = write_command(question, "plan", new_parts=[format_part_ranges(best.parts)])
+    if question.times:
+        return f"no set can be used at these times; compare all flights with {plan}"
+    if has_other_flights(situation.history, situation.settings, situation.td):
+        return f"no set can be used in the longest flight; compare the other flights with {plan}"
+    cure = best.decision.cure_without_other_times or "run it without switching"
+    return f"no set of parts can be used in this run: {cure}"
 
 
 def _name_step_without_set(answer: Parts, question: RepeatedQuestion) -> str:
     """Return the step if no set is recommended: to the missing deck, or to the verdict on all parts."""
     # The options name a deck that was not used.
     of_files = RepeatedQuestion(files=question.files)
+    if not answer.files.parts:
+        line = write_command(question, "plan")
+        return f"judge the energy of the whole model with {line}"
     if answer.inventory is None:
         deck = name_deck_of_run(question)
         line = write_command(of_files, "parts", "--deck", deck.name)
         return f"judge the parts with {line}{deck.hint}"
+    if question.times:
+        line = write_command(question, "parts")
+        return f"let d2rpick choose the times with {line}"
     if not any(row.flight and row.flight.flies is not None for row in answer.rows):
         line = write_command(question, "plan", new_parts=["all"])
         return f"if all parts fly together, plan their switching with {line}"
@@ -526,7 +555,7 @@ def _list_verdict_of_set(best: PartSet, name: str) -> list[tuple[str, str]]:
         return [("make rigid", name)]
     tr, td = best.window
     verdict, *why_and_cure = list_verdict_lines(decision, tr, td)[:-1]
-    action = "best set" if decision.verdict == DO_NOT_USE else "make rigid"
+    action = "best set" if is_refused(decision) else "make rigid"
     return [(verdict[0], f"{action} {name}; {verdict[1]}"), *why_and_cure]
 
 

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any, Final
 from d2rpick.base.errors import list_names, make_printable
 from d2rpick.choice.pair.grades import DO_NOT_USE, GOOD, USE, USE_WITH_CARE
 from d2rpick.choice.td.plan import TOO_SHORT
-from d2rpick.flight.flight import NEVER_FLIES, denies_every_flight
 from d2rpick.report import keys, tables
 from d2rpick.report.decision import (
     format_in_full,
@@ -28,11 +27,12 @@ from d2rpick.report.fields import (
 )
 from d2rpick.report.next_step import (
     add_step_to_copy,
-    ask_for_states_that_show_flight,
     name_lack_of_pairs,
     name_step_after_refusal,
+    name_step_after_switched_run,
     name_step_to_card,
     name_step_to_deck,
+    name_step_without_flight,
     name_way_out_of_run,
     needs_deck,
     write_command,
@@ -46,7 +46,6 @@ if TYPE_CHECKING:
     from d2rpick.choice.pair.decision import Decision
     from d2rpick.choice.pair.situation import Situation
     from d2rpick.choice.td.plan import PlannedFlight, RunPlan
-    from d2rpick.histories.history import History
     from d2rpick.report.formats import DisplayOptions, RepeatedQuestion, WrittenDeck
 
 
@@ -394,7 +393,8 @@ def _list_steps_for_record(
     plan: RunPlan, question: RepeatedQuestion, written_deck: WrittenDeck | None
 ) -> list[tuple[str, str]]:
     """Return the next commands for the part of the run that was read."""
-    if not plan.windows or _uses_only_poor_windows(plan):
+    is_refused = not plan.windows or _uses_only_poor_windows(plan)
+    if is_refused and not written_deck:
         return _list_step_without_window(plan, question)
     waiting = any(row.status == "re-plan" for row in plan.flights)
     cards = name_step_to_card(
@@ -446,37 +446,23 @@ def _list_step_without_window(
 ) -> list[tuple[str, str]]:
     """Return the command to type next if no window of a plan can be used now."""
     rows = [row for row in plan.flights if row.answer and not row.done]
+    is_partly_rigid = any(caution.code == "partly-rigid" for caution in plan.cautions)
+    if plan.done or is_partly_rigid:
+        return [("next", name_step_after_switched_run(question))]
     if not rows:
-        if plan.done:
-            return []
         if not plan.flights and not plan.history.complete:
             return []
         if not plan.flights:
-            return [("next", _name_step_without_flight(plan.history, question))]
+            return [("next", name_step_without_flight(plan.history, question))]
         return [("next", _name_step_if_flights_are_short(question))]
     answer = max(rows, key=lambda row: row.end - row.start).answer
     assert answer is not None
     better = answer.decision.better if answer.decision else None
-    otherwise = name_way_out_of_run(answer, question)
+    otherwise = name_way_out_of_run(answer.situation, answer.decision, question)
     step = name_step_after_refusal(
         answer.situation, better, question, otherwise, answer.decision
     )
     return [("next", step)]
-
-
-def _name_step_without_flight(history: History, question: RepeatedQuestion) -> str:
-    """Return the step if no flight is found; the end of the load is asked for unless the momentum shows no flight."""
-    more = ask_for_states_that_show_flight(
-        history.time.size, history.start, history.end
-    )
-    line = write_command(question, "info")
-    look = f"see what the run has to write with {line}"
-    if not denies_every_flight(history):
-        return f"{more}{look}, or give the end of the load as --after"
-    no_pair = f"{more}{name_lack_of_pairs(question)}: {NEVER_FLIES}"
-    if any(momenta.parts for momenta in history.momenta):
-        return f"{no_pair}; run it without switching"
-    return f"{no_pair}; to find out whether single parts fly, {look}"
 
 
 def _name_step_if_flights_are_short(question: RepeatedQuestion) -> str:

@@ -6,12 +6,13 @@ from typing import TYPE_CHECKING
 
 from d2rpick.report import tables
 from d2rpick.rules import RULES, find_rules
-from d2rpick.rules.rule import MAIN_DECK
+from d2rpick.rules.example import MAIN_DECK
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from d2rpick.rules.rule import Example, Rule
+    from d2rpick.rules.example import Example
+    from d2rpick.rules.rule import Rule
 
 
 def list_rules() -> str:

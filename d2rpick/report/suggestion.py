@@ -22,6 +22,7 @@ from d2rpick.report.decision import (
 from d2rpick.report.fields import Document, Field, many, maybe, row, write_csv
 from d2rpick.report.next_step import (
     add_step_to_copy,
+    name_step_after_flight,
     name_step_after_refusal,
     name_step_with_pair,
     write_command,
@@ -190,19 +191,20 @@ def list_verdict(answer: PairSuggestion) -> list[tuple[str, str]]:
     lines = [("no pair to use", answer.why_none)]
     if best and decision:
         lines = list_verdict_lines(decision, best.tr, answer.td)
-    if better and not (decision and decision.better):
-        lines.append(("better pair", _judge_better_pair(answer, better)))
+    # A pair that cannot be used either is no way out, so it is left out.
+    is_usable = not is_refused(answer.decision_on_better)
+    if better and is_usable and not (decision and decision.better):
+        lines.append(("better pair", _describe_better_pair(answer, better)))
     return lines
 
 
-def _judge_better_pair(answer: PairSuggestion, better: Pair) -> str:
-    """Describe the better pair with its verdict, or state that it cannot be used."""
+def _describe_better_pair(answer: PairSuggestion, better: Pair) -> str:
+    """Describe the better pair with its verdict, if it was judged."""
     decision = answer.decision_on_better
+    improvement = describe_improvement(answer, better)
     if decision is None:
-        return f"{_format_times(better)}: {describe_improvement(answer, better)}"
-    if decision.verdict == DO_NOT_USE:
-        return f"{_format_times(better)}: {DO_NOT_USE} it, because {decision.reason}"
-    return f"{_format_times(better)}: {decision.verdict}; {describe_improvement(answer, better)}"
+        return f"{_format_times(better)}: {improvement}"
+    return f"{_format_times(better)}: {decision.verdict}; {improvement}"
 
 
 def list_evidence(answer: PairSuggestion) -> list[tuple[str, str]]:
@@ -248,8 +250,12 @@ def _name_step_after_refusal(
     judged = answer.decision_on_better
     if decision is None and judged is not None and judged.verdict == DO_NOT_USE:
         better = None
-    if answer.td_window is not None:
+    is_given_window = "--td-window" in question.times
+    is_compared = answer.td_window is not None or (decision and decision.best_of)
+    if is_given_window:
         otherwise = f"compare all flights with {write_command(question, 'plan')}"
+    elif is_compared or answer.situation.flight.start is None:
+        otherwise = name_step_after_flight(answer.situation, decision, question)
     elif decision is None and answer.situation.flight.start is not None:
         otherwise = (
             f"let d2rpick choose both times with {write_command(question, 'suggest')}"
@@ -280,7 +286,7 @@ def describe_improvement(answer: PairSuggestion, better: Pair) -> str:
 def list_alternatives(answer: PairSuggestion) -> list[tuple[str, str]]:
     """Return the alternatives to the recommended pair, as (name, sentence) pairs."""
     chosen = answer.recommended.tr if answer.recommended else None
-    # The windows have the energy of td, but "admissible" would contradict the verdict on a pair not to be used.
+    # The energy in these windows matches that at td, but "admissible" would contradict the verdict "do not use".
     if answer.windows and not is_refused(answer.decision):
         lines = [("admissible", describe_acceptable_windows(answer.windows, chosen))]
     else:

@@ -9,6 +9,7 @@ from d2rpick.choice.pair.quality import EQUALLY_GOOD
 from d2rpick.report import keys, tables
 from d2rpick.report.decision import (
     format_with_number,
+    is_refused,
     list_numbered_reasons,
     list_verdict_lines,
     number_reasons,
@@ -16,8 +17,10 @@ from d2rpick.report.decision import (
 from d2rpick.report.fields import Document, Field, many, maybe, row, write_csv
 from d2rpick.report.next_step import (
     add_step_to_copy,
+    name_step_after_flight,
     name_step_after_refusal,
     name_step_with_pair,
+    name_step_without_flight,
     write_command,
 )
 from d2rpick.report.situation import describe_input
@@ -69,6 +72,12 @@ _SPARE: Final = (
     "kinetic fraction",
 )
 
+# Error of a td if no model of the vibration is known, and its meaning.
+_LEVEL_SHORTFALL: Final = "level shortfall"
+_SHORTFALL_MEANS: Final = (
+    "part of the largest deformation that is missing at td, judged by the energy alone; the vibration may be wrong by "
+    "more"
+)
 _NONE_ADMISSIBLE: Final = "no td in the range has an admissible tr"
 _NONE_BETTER: Final = "no other td in the range is better"
 _NOT_HALVED: Final = "no other td in the range halves this error without giving up more than half of the rigid time"
@@ -127,12 +136,19 @@ def list_next_step(
     """Return the next command, which leads to the card of the requested or chosen pair, otherwise to a better pair."""
     offer = trade_off.requested or trade_off.recommended
     decision = trade_off.decide_on(offer) if offer else None
+    situation = offer.answer.situation if offer else trade_off.situation
     if offer is None or offer.tr is None or decision is None:
-        step = f"compare all flights with {write_command(question, 'plan')}"
+        if situation.flight.start is None:
+            step = name_step_without_flight(situation.history, question)
+        else:
+            step = f"compare all flights with {write_command(question, 'plan')}"
     elif decision.verdict == DO_NOT_USE:
-        otherwise = f"compare all flights with {write_command(question, 'plan')}"
+        if "--td-window" in question.times:
+            otherwise = f"compare all flights with {write_command(question, 'plan')}"
+        else:
+            otherwise = name_step_after_flight(situation, decision, question)
         step = name_step_after_refusal(
-            offer.answer.situation, decision.better, question, otherwise, decision
+            situation, decision.better, question, otherwise, decision
         )
     else:
         times = ("--td", f"{offer.td:.6g}")
@@ -185,37 +201,32 @@ def _list_choice_if_td_is_free(
     best = trade_off.recommended
     if best is None or best is requested or best.decision is None:
         return []
+    if is_refused(best.decision):
+        return [("if td is free", "no other td of the range has a usable pair either")]
     return [
         ("if td is free", f"{best.decision.verdict}: {_describe_offer(best)}"),
     ]
 
 
 def list_costs_of_other_offers(trade_off: TradeOff) -> list[tuple[str, str]]:
-    """Describe the drawbacks of a pair with a smaller error and of a pair with a longer rigid time."""
+    """Describe the drawbacks of a pair with a smaller error and of a pair with a longer rigid time.
+
+    A pair that cannot be used is no alternative, so it stands only in the table.
+    """
     best = trade_off.recommended
     if best is None:
         return []
     lines = []
     accurate = trade_off.more_accurate
-    if accurate:
+    if accurate and not is_refused(accurate.decision):
         cost_text = _describe_cost_change(best, accurate)
-        warned = _warn_about_refused(accurate)
-        lines.append(
-            ("smaller error", f"{_describe_error_at(accurate)}{warned} {cost_text}")
-        )
+        lines.append(("smaller error", f"{_describe_error_at(accurate)} {cost_text}"))
     longest = trade_off.start
-    if longest and (longest.rigid_time or 0.0) > (best.rigid_time or 0.0):
+    is_longer = longest and (longest.rigid_time or 0.0) > (best.rigid_time or 0.0)
+    if longest and is_longer and not is_refused(longest.decision):
         cost_text = _describe_cost_change(best, longest)
-        warned = _warn_about_refused(longest)
-        lines.append(("longest", f"{_describe_error_at(longest)}{warned} {cost_text}"))
+        lines.append(("longest", f"{_describe_error_at(longest)} {cost_text}"))
     return lines
-
-
-def _warn_about_refused(offer: Offer) -> str:
-    """Return the verdict in parentheses if a proposed pair cannot be used; otherwise ""."""
-    decision = offer.decision
-    refused = decision is not None and decision.verdict == DO_NOT_USE
-    return f" ({DO_NOT_USE})" if refused else ""
 
 
 def _describe_offer(offer: Offer) -> str:
@@ -338,8 +349,8 @@ def _describe_cost_change(start: Offer, step: Offer) -> str:
     if start.saving is not None and step.saving is not None:
         longer = start.saving - step.saving
         if abs(longer) < _NO_CHANGE:
-            return "costs no CPU time"
-        return f"{'costs' if longer > 0 else 'saves'} {abs(longer):.1%} of the reference's CPU time"
+            return "needs the same CPU time"
+        return f"needs {1 - step.saving:.1%} of the CPU time of the reference run instead of {1 - start.saving:.1%}"
     assert start.rigid_time is not None
     assert step.rigid_time is not None
     change = step.rigid_time / start.rigid_time - 1
@@ -355,7 +366,7 @@ def _format_offer_error(offer: Offer) -> str:
     if offer.error is None:
         return "an energy above twice its mean"
     if offer.basis == "energy":
-        return f"level shortfall {tables.format_measure(offer.error)}"
+        return f"{_LEVEL_SHORTFALL} {tables.format_measure(offer.error)}"
     return f"residual {tables.format_measure(offer.error)}"
 
 
@@ -409,12 +420,15 @@ def _name_errors(offers: Sequence[Offer]) -> str:
     is_by_level = {offer.basis == "energy" for offer in offers}
     if len(is_by_level) > 1:
         return "error"
-    return "level shortfall" if True in is_by_level else "residual"
+    return _LEVEL_SHORTFALL if True in is_by_level else "residual"
 
 
 def list_offer_reasons(offers: Sequence[Offer]) -> list[tuple[str, str]]:
-    """Return the reasons for the verdicts on the proposed pairs, each with its number in the table."""
-    return list_numbered_reasons(_number_offer_reasons(offers))
+    """Return the meaning of the errors, and the reasons for the verdicts, each with its number in the table."""
+    reasons = list_numbered_reasons(_number_offer_reasons(offers))
+    if any(offer.basis == "energy" and offer.error is not None for offer in offers):
+        return [*reasons, (_LEVEL_SHORTFALL, _SHORTFALL_MEANS)]
+    return reasons
 
 
 def _number_offer_reasons(offers: Sequence[Offer]) -> dict[str, int]:

@@ -20,6 +20,7 @@ from d2rpick.report.decision import (
 from d2rpick.report.fields import Document, Field, get_kind, many, maybe, row
 from d2rpick.report.next_step import (
     add_step_to_copy,
+    name_step_after_flight,
     name_step_after_refusal,
     name_step_with_pair,
     write_command,
@@ -85,6 +86,11 @@ DOCUMENT: Final = Document("d2rpick/verify/2", "Answer of d2rpick verify; times 
     Field("switched", maybe(SWITCHED), "comparison of a finished switched run with the reference run; null without "
                                        "--switched"),
 ))  # fmt: skip
+# Step after a comparison within the limits of a pair that cannot be used.
+_USE_MOTION_OF_SWITCHED_RUN: Final = (
+    "use at most the motion of this switched run, because nothing shows that its vibration after td is right; "
+    "`min_quality` poor accepts it"
+)
 COMPARED = ("", "switched", "reference")
 
 
@@ -126,13 +132,15 @@ def list_next_step(
     decision = answer.decision
     situation = answer.situation
     if decision.verdict == DO_NOT_USE:
-        line = write_command(question, "explore", "--td", f"{answer.td:.6g}")
+        if answer.switched and not answer.switched.objections:
+            otherwise = _USE_MOTION_OF_SWITCHED_RUN
+        elif decision.best_of or situation.flight.start is None:
+            otherwise = name_step_after_flight(situation, decision, question)
+        else:
+            line = write_command(question, "explore", "--td", f"{answer.td:.6g}")
+            otherwise = f"compare other td with {line}"
         step = name_step_after_refusal(
-            situation,
-            decision.better,
-            question,
-            f"compare other td with {line}",
-            decision,
+            situation, decision.better, question, otherwise, decision
         )
     elif later := _find_next_window(answer):
         line = _write_command_for_window(question, later)
@@ -356,7 +364,7 @@ def list_all_measures(answer: PairVerdict) -> dict[str, Any]:
 
 
 def as_csv(answer: PairVerdict, _: DisplayOptions) -> str:
-    """Return one row of CSV with a column for each key that `measures` returns."""
+    """Return one row of CSV with a column for each key that `list_all_measures` returns."""
     values = list_all_measures(answer)
     return tables.as_csv(list(values), [list(values.values())]).rstrip("\n")
 

@@ -254,8 +254,9 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "Nothing to do if it is the deck of this run. Otherwise give another deck with --deck, or use --no-deck.",
         ),
         "deck-not-followed": Explanation(
-            "Either d2rpick cannot evaluate an item of the deck, such as a curve or a sensor, and uses the history "
-            "instead, or the deck already contains switching cards, which the answer does not consider.",
+            "There are two possible causes. If d2rpick cannot evaluate an item of the deck, such as a curve or a "
+            "sensor, it uses the history instead. If the deck already contains switching cards, the answer does not "
+            "consider them.",
             "Check the named line. If it is a load, give its end with --after.",
         ),
         "deck-of-another-model": Explanation(

@@ -75,7 +75,7 @@ class Severity(StrEnum):
 
     @property
     def rank(self) -> int:
-        """Return 0 for an error, 1 for a warning, 2 for an info."""
+        """Rank of the severity: 0 for error, 1 for warning, 2 for info."""
         return list(Severity).index(self)
 
 
@@ -273,9 +273,9 @@ class Case:
         )
 
     @property
-    def whole(self) -> bool:
+    def knows_all_parts(self) -> bool:
         """Return True if all parts are known; a file of switching cards that another deck includes knows none."""
-        return self.parts.all_known and bool(self.parts.materials)
+        return self.parts.all_known and bool(self.parts.material_by_part)
 
     @cached_property
     def end_time(self) -> Value[float] | None:
@@ -283,7 +283,7 @@ class Case:
         return next(
             (
                 value
-                for card, value in self.supporting
+                for card, value in self.end_and_intervals
                 if card.name == "CONTROL_TERMINATION"
             ),
             None,
@@ -335,7 +335,7 @@ class Case:
         return find_unswitchable_in_ls_dyna(self.deck, self.parts)
 
     @cached_property
-    def supporting(self) -> tuple[tuple[Card, Value[float]], ...]:
+    def end_and_intervals(self) -> tuple[tuple[Card, Value[float]], ...]:
         """Return ENDTIM and the DT of the energy databases, each with its card."""
         names = ("CONTROL_TERMINATION", "DATABASE_GLSTAT", "DATABASE_MATSUM")
         cards = [
@@ -514,5 +514,5 @@ class RunCase(Case):
         return rigid_legs
 
 
-Objection = tuple[CardField, str]
+PlacedMessage = tuple[CardField, str]
 """A field of the deck, and what is wrong there."""

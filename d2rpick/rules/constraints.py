@@ -14,17 +14,15 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.errors import choose_verb, name_units
 from d2rpick.deck.ls_dyna_parts import DELETING_FLAGS, read_merged_bodies
-from d2rpick.rules.base import ERROR, WARNING, Case, Objection, group_values
+from d2rpick.rules.base import ERROR, WARNING, Case, PlacedMessage, group_values
+from d2rpick.rules.example import Example, make_deck, write_automatic_card
 from d2rpick.rules.rule import (
     BACK,
     PASS,
     THERE,
-    Example,
-    make_deck,
     make_rule_decorator,
     set_failing,
     set_passing,
-    write_automatic_card,
 )
 from d2rpick.rules.switched_parts import find_lead_parts
 
@@ -197,7 +195,7 @@ def _find_joinings(case: Case, kinds: Sequence[Kind]) -> Iterator[_Joining]:
 
 def _find_active(
     case: Case, kinds: Sequence[Kind], rule_of_deleted: str
-) -> Iterator[Objection]:
+) -> Iterator[PlacedMessage]:
     """Yield constraints on parts that a card makes rigid without deleting these constraints.
 
     ``rule_of_deleted`` is the rule that reports a deleted constraint between parts that then separate.
@@ -226,7 +224,7 @@ def _find_active(
         yield joining.constraint.place, f"{problem}; {cure}"
 
 
-def _find_separating(case: Case, kinds: Sequence[Kind]) -> Iterator[Objection]:
+def _find_separating(case: Case, kinds: Sequence[Kind]) -> Iterator[PlacedMessage]:
     """Yield constraints that a card deletes although their parts do not become one rigid body."""
     for joining in _find_joinings(case, kinds):
         deleting = joining.find_card(deletes=True)
@@ -261,7 +259,7 @@ def _find_separating(case: Case, kinds: Sequence[Kind]) -> Iterator[Objection]:
 @make_rule_decorator(
     "D2R112", ERROR, "a nodal rigid body on a switched part stays active (NRBF)"
 )
-def _check_nodal_bodies(case: Case) -> Iterator[Objection]:
+def _check_nodal_bodies(case: Case) -> Iterator[PlacedMessage]:
     """A node cannot belong to two rigid bodies. The card that makes a part rigid must delete the nodal rigid bodies on
     it, and the card that switches back must activate them again. Otherwise the run stops (Error 30164, as a public drop
     tool reports). Source: vendor keyword data for NRBF, according to which such bodies cause instabilities.
@@ -289,7 +287,7 @@ def _check_nodal_bodies(case: Case) -> Iterator[Objection]:
 @make_rule_decorator(
     "D2R120", ERROR, "a deleted nodal rigid body (NRBF 1) that joins separate bodies"
 )
-def _check_separated_parts(case: Case) -> Iterator[Objection]:
+def _check_separated_parts(case: Case) -> Iterator[PlacedMessage]:
     """While NRBF 1 deletes a nodal rigid body, only the rigid body of its parts connects them. The parts that it joins
     separate if they become several rigid bodies, or if one of them is not switched. Source: vendor keyword data for
     NRBF and LRB.
@@ -320,7 +318,7 @@ def _check_separated_parts(case: Case) -> Iterator[Objection]:
     WARNING,
     "extra nodes, a joint or a weld on a switched part stays active (NRBF, NCSF)",
 )
-def _check_other_constraints(case: Case) -> Iterator[Objection]:
+def _check_other_constraints(case: Case) -> Iterator[PlacedMessage]:
     """Extra nodes, joints, spotwelds, rivets, generalized welds and constrained node sets constrain nodes. On a part
     that a card makes rigid, these nodes also belong to its rigid body. According to the vendor, such constraints are
     invalid for a rigid body: they must be deleted while the part is rigid, and activated again when it is switched
@@ -359,7 +357,7 @@ def _check_other_constraints(case: Case) -> Iterator[Objection]:
     WARNING,
     "a deleted joint, weld or set of extra nodes (NRBF 1, NCSF 1) that joins separate bodies",
 )
-def _check_separated_joints(case: Case) -> Iterator[Objection]:
+def _check_separated_joints(case: Case) -> Iterator[PlacedMessage]:
     """While NRBF 1 or NCSF 1 deletes a joint, weld or extra nodes, only the rigid body of the parts connects them. The
     parts separate if they become several rigid bodies, or if one of them stays deformable. Nodal rigid bodies on
     the parts may hold the joint; NRBF 1 deletes them too. Source: vendor keyword data for NRBF, NCSF and LRB. It is not
@@ -384,7 +382,7 @@ def _check_separated_joints(case: Case) -> Iterator[Objection]:
     ]
 )
 @make_rule_decorator("D2R122", WARNING, "a switched part on *CONSTRAINED_RIGID_BODIES")
-def _check_merged_bodies(case: Case) -> Iterator[Objection]:
+def _check_merged_bodies(case: Case) -> Iterator[PlacedMessage]:
     """*CONSTRAINED_RIGID_BODIES merges rigid bodies whose parts have *MAT_RIGID. A part that a card makes rigid has a
     deformable material, so the keyword does not apply to it, and the parts become separate rigid bodies unless the card
     merges them. Source: the vendor's public help on the command that writes this keyword. Not tested with the solver.

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 from d2rpick.base.errors import Caution, DeckError, give_if_written, name_units
 from d2rpick.choice.answers import PairVerdict, find_better_pair, suggest_at, verify_run
 from d2rpick.choice.health import WRONG_ENERGY
-from d2rpick.choice.pair.quality import list_exceeded_limits, name_parts_in_verify
+from d2rpick.choice.pair.cures import name_parts_in_verify
+from d2rpick.choice.pair.quality import list_exceeded_limits
 from d2rpick.choice.pair.situation import examine_td
 from d2rpick.choice.pair.warnings import (
     POOR_KINETIC_SHARE,

@@ -10,21 +10,23 @@ from d2rpick.deck.card import CardField, Problem
 from d2rpick.deck.ls_dyna_parts import find_element_cards
 from d2rpick.deck.reader import UNKNOWN_KIND, describe_cure, find_cuts
 from d2rpick.deck.switching import SwitchSet, find_misspelt
-from d2rpick.rules.base import BOTH, ERROR, INFO, LS_DYNA, WARNING, Case, Objection
-from d2rpick.rules.rule import (
-    BACK,
+from d2rpick.rules.base import BOTH, ERROR, INFO, LS_DYNA, WARNING, Case, PlacedMessage
+from d2rpick.rules.example import (
     END,
-    GOOD,
     HEAD,
     PARTS,
-    PASS,
-    THERE,
     Example,
     make_deck,
+    write_automatic_card,
+)
+from d2rpick.rules.rule import (
+    BACK,
+    GOOD,
+    PASS,
+    THERE,
     make_rule_decorator,
     set_failing,
     set_passing,
-    write_automatic_card,
 )
 
 if TYPE_CHECKING:
@@ -85,7 +87,7 @@ def _make_elements(keyword: str) -> Example:
 @make_rule_decorator(
     "D2R001", ERROR, "the rows after a card do not match its D2R/R2D counts"
 )
-def _check_counts(case: Case) -> Iterator[Objection]:
+def _check_counts(case: Case) -> Iterator[PlacedMessage]:
     """The second line of *DEFORMABLE_TO_RIGID_AUTOMATIC gives the number of D2R lines (D2R) and of R2D lines (R2D) that
     follow it, one line per part. If a count is wrong or a line is missing, the solver reads a part from the wrong line,
     or reads a part line as the next card. If both counts are 0, the card switches no part.
@@ -131,7 +133,7 @@ def _check_counts(case: Case) -> Iterator[Objection]:
     "a switching keyword, number or &parameter that cannot be read",
     BOTH,
 )
-def _check_fields(case: Case) -> Iterator[Objection]:
+def _check_fields(case: Case) -> Iterator[PlacedMessage]:
     """Fields are 10 columns wide (20 in long format), unless the line is separated by commas. If the columns of a
     number contain text, or a parameter is undefined, the run stops, or the solver reads another value. If a switching
     keyword is misspelled, the solver ignores the card. d2rpick also checks ENDTIM and the DT of *DATABASE_GLSTAT and
@@ -151,11 +153,11 @@ def _check_fields(case: Case) -> Iterator[Objection]:
     if case.sets:
         for field, problem in (*case.parts.problems, *_find_unreadable_members(case)):
             yield field, f"{problem}; it is needed to know which parts are switched"
-        for support, value in case.supporting:
+        for card_of_time, value in case.end_and_intervals:
             if value.problem:
                 yield (
                     value.field,
-                    f"{value.problem}; *{support.name} is needed to judge the switching times",
+                    f"{value.problem}; *{card_of_time.name} is needed to judge the switching times",
                 )
 
 
@@ -183,7 +185,7 @@ def _find_unreadable_members(case: Case) -> Iterator[Problem]:
 @make_rule_decorator(
     "D2R003", ERROR, "an include file is missing or cannot be read", BOTH
 )
-def _check_includes(case: Case) -> Iterator[Objection]:
+def _check_includes(case: Case) -> Iterator[PlacedMessage]:
     """d2rpick looks for include files in the folder of the main deck, in the folders of *INCLUDE_PATH and in the folder
     of the including file. For Radioss it follows #include in the same way. d2rpick reports a file that is missing, that
     cannot be read, or that includes itself. The file may contain switching cards, rigid bodies, parts or parameters, so
@@ -213,7 +215,7 @@ def _check_includes(case: Case) -> Iterator[Objection]:
     WARNING,
     "a parameter used by a card is defined twice with different values",
 )
-def _check_parameters(case: Case) -> Iterator[Objection]:
+def _check_parameters(case: Case) -> Iterator[PlacedMessage]:
     """By default LS-DYNA warns and keeps the first definition. *PARAMETER_DUPLICATION and *PARAMETER_MUTABLE change
     that, and other programs that read decks keep the last definition. A switching time must not depend on this choice.
 
@@ -226,7 +228,9 @@ def _check_parameters(case: Case) -> Iterator[Objection]:
         if value.parameters
     ]
     if case.sets:
-        uses += [(card, value) for card, value in case.supporting if value.parameters]
+        uses += [
+            (card, value) for card, value in case.end_and_intervals if value.parameters
+        ]
     reported: set[tuple[Card, str]] = set()
     for card, value in uses:
         for name in card.scope.closure(value.parameters):
@@ -252,7 +256,7 @@ def _check_parameters(case: Case) -> Iterator[Objection]:
 @make_rule_decorator(
     "D2R110", WARNING, "the card is in a transformed include whose FCTTIM is not 1"
 )
-def _check_time_factor(case: Case) -> Iterator[Objection]:
+def _check_time_factor(case: Case) -> Iterator[PlacedMessage]:
     """*INCLUDE_TRANSFORM multiplies the times of the included file by FCTTIM (0 is read as 1). d2rpick applies this
     factor to the switching times too. No available source confirms that the solver does the same.
 
@@ -279,7 +283,7 @@ def _check_time_factor(case: Case) -> Iterator[Objection]:
 @make_rule_decorator(
     "D2R303", INFO, "an encrypted block, which may contain switching cards"
 )
-def _report_encrypted(case: Case) -> Iterator[Objection]:
+def _report_encrypted(case: Case) -> Iterator[PlacedMessage]:
     """Models from vendors may contain encrypted blocks, from BEGIN PGP MESSAGE to END PGP MESSAGE, which only the
     solver can read. d2rpick cannot check switching cards, parts or parameters in such a block.
 
@@ -302,7 +306,7 @@ def _report_encrypted(case: Case) -> Iterator[Objection]:
 @make_rule_decorator(
     "D2R011", WARNING, "a file of the deck seems to be truncated", BOTH
 )
-def _check_truncation(case: Case) -> Iterator[Objection]:
+def _check_truncation(case: Case) -> Iterator[PlacedMessage]:
     """A file seems to be truncated if it has no *END (Radioss: /END) and its last line has no line end. A main deck
     without *END whose last lines are nodes or elements may be truncated too. The last number may be incomplete, and
     switching cards, parts or parameters may be missing. d2rpick parts computes no cost from a truncated mesh.
@@ -318,7 +322,7 @@ def _check_truncation(case: Case) -> Iterator[Objection]:
 
 @set_failing(lambda: [make_deck("*COMMENT c:" + THERE)])
 @make_rule_decorator("D2R301", INFO, "a card disabled by *COMMENT")
-def _report_disabled(case: Case) -> Iterator[Objection]:
+def _report_disabled(case: Case) -> Iterator[PlacedMessage]:
     """All lines from *COMMENT to the next keyword are a comment, and so is the rest of the keyword line. A switching
     card in this block looks active but has no effect.
 
@@ -344,15 +348,15 @@ def _report_disabled(case: Case) -> Iterator[Objection]:
     "switches whose card gives no time: CODE 1-5, restart cards, plain *DEFORMABLE_TO_RIGID",
     BOTH,
 )
-def _report_untimed(case: Case) -> Iterator[Objection]:
+def _report_untimed(case: Case) -> Iterator[PlacedMessage]:
     """CODE 1 to 4 switch by the force of a contact or rigid wall, and CODE 5 by a sensor. Restart cards switch when the
     restart begins, and plain cards at the start of the run. A Radioss body may be switched by a sensor other than
-    /SENSOR/TIME. No time on such a card can be compared with an energy history. If the history has the force of the
-    contact or wall (or the part momenta, if the deck has only one contact or wall), d2rpick finds the switching times
-    from it and judges them. d2rpick evaluates a *SENSOR_CONTROL if its *SENSOR_SWITCH depends on the time, or on the
-    magnitude of such a force. It assumes that the parts are rigid while the sensor is on, and deformable while it is
-    off; this was not tested with the solver. If you check restarts together with their main deck, they have times: each
-    restart begins at the ENDTIM of the previous run.
+    /SENSOR/TIME. No time on such a card can be compared with an energy history. If the history contains the force of
+    the contact or wall, d2rpick finds the switching times from this force, and judges them. Part momenta are enough if
+    the deck has only one contact or wall. d2rpick evaluates a *SENSOR_CONTROL if its *SENSOR_SWITCH depends on the
+    time, or on the magnitude of a contact or wall force. It assumes that the parts are rigid while the sensor is on,
+    and deformable while it is off; this was not tested with the solver. If you check restarts together with their main
+    deck, they have times: each restart begins at the ENDTIM of the previous run.
 
     Fix: To have the switches judged, give a history with contact forces or part momenta (--history), check restarts
     together with their main deck, or switch by time (CODE 0).
@@ -404,7 +408,7 @@ def _has_judged_end(case: Case, card: SwitchSet) -> bool:
     lambda: [_make_elements("*ELEMENT_SHELL_DOF"), _make_elements("*ELEMENT_BEAM_PID")]
 )
 @make_rule_decorator("D2R304", INFO, "elements that are not searched for shared nodes")
-def _report_unread_elements(case: Case) -> Iterator[Objection]:
+def _report_unread_elements(case: Case) -> Iterator[PlacedMessage]:
     """D2R108 searches the elements for nodes that separate rigid bodies share. Some options of element keywords put
     further integers on the element lines. d2rpick does not read such lines, so D2R108 may miss shared nodes.
 
@@ -428,7 +432,7 @@ def _report_unread_elements(case: Case) -> Iterator[Objection]:
 @make_rule_decorator(
     "D2R305", INFO, "*DEFORMABLE_TO_RIGID_INERTIA: mass and inertia given for a switch"
 )
-def _report_inertias(case: Case) -> Iterator[Objection]:
+def _report_inertias(case: Case) -> Iterator[PlacedMessage]:
     """The card replaces the mass properties that the solver computes from the mesh when it makes the part rigid. If the
     card comes from an earlier state of the model, mass and inertia are wrong, and the solver issues no message. Source:
     vendor keyword data.
@@ -458,7 +462,7 @@ def _report_inertias(case: Case) -> Iterator[Objection]:
     INFO,
     "switching cards on standard input without parts: ids are not checked",
 )
-def _report_missing_parts(case: Case) -> Iterator[Objection]:
+def _report_missing_parts(case: Case) -> Iterator[PlacedMessage]:
     """A file that contains only switching cards is meant to be included by another deck, and is checked with it. Cards
     from standard input, as in d2rpick card ... | d2rpick check -, come without a deck, so d2rpick cannot check that
     their parts exist.
@@ -468,7 +472,7 @@ def _report_missing_parts(case: Case) -> Iterator[Objection]:
     if (
         case.deck.path == STDIN
         and case.sets
-        and not case.parts.materials
+        and not case.parts.material_by_part
         and case.parts.all_known
     ):
         problem = (

@@ -8,18 +8,16 @@ from typing import TYPE_CHECKING, Final
 from d2rpick.base.errors import name_units
 from d2rpick.deck.radioss_columns import AFTER_DELAY
 from d2rpick.deck.radioss_files import AT_REST, NOT_FOLLOWED, THROUGH_WALL
-from d2rpick.rules.base import ERROR, INFO, RADIOSS, WARNING, Objection, RunCase
-from d2rpick.rules.rule import (
-    GOOD_RUN,
+from d2rpick.rules.base import ERROR, INFO, RADIOSS, WARNING, PlacedMessage, RunCase
+from d2rpick.rules.example import (
     WINDOW,
     Example,
-    make_rule_decorator,
     make_run,
-    set_failing,
-    set_passing,
     write_engine_files,
+    write_row,
     write_starter_deck,
 )
+from d2rpick.rules.rule import GOOD_RUN, make_rule_decorator, set_failing, set_passing
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -42,31 +40,24 @@ _KEEPS: Final = (
     .partition("/GRNOD")[0]
     .replace("         7\n", "         7         1\n")
 )  # Starter deck with a rigid body for which Ikrem is 1.
+_NODES: Final = "/GRNOD/NODE/8\nnodes of the box\n" + write_row(1, 2, 3, 4)
+_MAIN: Final = "/GRNOD/NODE/9\nmain node\n" + write_row(1808)
+_PLACES: Final = "/NODE\n" + "".join(
+    write_row(n)[:-1] + write_row(0.1 * n, 0.0, 0.05, width=20) for n in (1, 2, 3, 4)
+)
 # Arguments of `d2rpick replay` for a matsum history in which only the third part deforms.
 _SPRING: Final = "--stiffness 660e3 --mass 31.4 --beta 2 --alpha 50 --v0 6 --t-end 0.3 --dt 1e-3 --write-as matsum"
-
-
-def _write_row(*fields: float | str, width: int = 10) -> str:
-    """Return a line whose fields are right-aligned in columns of the given width."""
-    return "".join(f"{field:>{width}}" for field in fields) + "\n"
-
-
-_NODES: Final = "/GRNOD/NODE/8\nnodes of the box\n" + _write_row(1, 2, 3, 4)
-_MAIN: Final = "/GRNOD/NODE/9\nmain node\n" + _write_row(1808)
-_PLACES: Final = "/NODE\n" + "".join(
-    _write_row(n)[:-1] + _write_row(0.1 * n, 0.0, 0.05, width=20) for n in (1, 2, 3, 4)
-)
 
 
 def _write_wall(added: int, left_out: int = 0, reach: float = 0.0) -> str:
     """Return a rigid wall at z = 0 that acts on nodes within ``reach`` and on group ``added``, not on ``left_out``."""
     text = (
         "/RWALL/PLANE/3\nground\n"
-        + _write_row(0, 0, added, left_out)
-        + _write_row(reach, 0.0, 0.0, width=20)
+        + write_row(0, 0, added, left_out)
+        + write_row(reach, 0.0, 0.0, width=20)
     )
     return (
-        text + _write_row(0.0, 0.0, 0.0, width=20) + _write_row(0.0, 0.0, 1.0, width=20)
+        text + write_row(0.0, 0.0, 0.0, width=20) + write_row(0.0, 0.0, 1.0, width=20)
     )
 
 
@@ -74,8 +65,8 @@ def _write_velocity(group: int, speed: float = 10.0) -> str:
     """Return an /INIVEL that gives this speed to the nodes of a group."""
     return (
         "/INIVEL/TRA/4\nthrown\n"
-        + _write_row(speed, 0.0, 0.0, width=20)[:-1]
-        + _write_row(group)
+        + write_row(speed, 0.0, 0.0, width=20)[:-1]
+        + write_row(group)
     )
 
 
@@ -87,7 +78,7 @@ def _make_run_with(*more: str) -> Example:
 def _make_started_run(state: str, *nodes: int) -> Example:
     """Return a run whose first engine file gives nodes an initial velocity while the body is ``state`` (ON or OFF)."""
     files = write_engine_files(("0.02", state), ("0.2", "OFF"))
-    files["box_0001.rad"] += "/INIV/TRA/X/1\n10.0\n" + _write_row(*nodes)
+    files["box_0001.rad"] += "/INIV/TRA/X/1\n10.0\n" + write_row(*nodes)
     return make_run(files, write_starter_deck(_NODES.replace("NODE/8", "NODE/7")))
 
 
@@ -95,9 +86,9 @@ def _make_wheel_run(
     further_nodes: str = "", members: tuple[int, ...] = (5, 6, 7, 8), part: int = 2
 ) -> Example:
     """Return a run that has a wheel as a second rigid body; the first /RBODY/OFF also lists ``further_nodes``."""
-    mesh = f"/PART/{part}\nwheel\n{_write_row(1, 1)}/SHELL/{part}\n{_write_row(2, 5, 6, 7, 8)}"
-    wheel = f"{mesh}/GRNOD/NODE/6\nwheel\n{_write_row(*members)}"
-    body = "/RBODY/2\nwheel\n" + _write_row(1809, 0, 0, 0, "", 0, 6)
+    mesh = f"/PART/{part}\nwheel\n{write_row(1, 1)}/SHELL/{part}\n{write_row(2, 5, 6, 7, 8)}"
+    wheel = f"{mesh}/GRNOD/NODE/6\nwheel\n{write_row(*members)}"
+    body = "/RBODY/2\nwheel\n" + write_row(1809, 0, 0, 0, "", 0, 6)
     files = {
         **_LEGS,
         "box_0001.rad": _LEGS["box_0001.rad"].replace(
@@ -133,7 +124,7 @@ def _find_switching_legs(case: RunCase) -> list[RadiossLeg]:
     "engine files of a Radioss run that are not consecutive",
     (RADIOSS,),
 )
-def _check_order(case: RunCase) -> Iterator[Objection]:
+def _check_order(case: RunCase) -> Iterator[PlacedMessage]:
     """Each engine file continues the run from the end of the previous engine file. The files are numbered from 1
     without gaps, their /RUN lines have the same name, and no file ends before the previous file. Otherwise d2rpick
     cannot determine when a part is rigid. Two engine files with the same end time are not reported. Source: Altair's
@@ -185,7 +176,7 @@ def _check_order(case: RunCase) -> Iterator[Objection]:
     "/RBODY/ON or /RBODY/OFF lists a node that is not a main node",
     (RADIOSS,),
 )
-def _check_main_nodes(case: RunCase) -> Iterator[Objection]:
+def _check_main_nodes(case: RunCase) -> Iterator[PlacedMessage]:
     """/RBODY/ON and /RBODY/OFF list the main nodes of rigid bodies, not the ids of the bodies. The engine skips any
     other node without a message, so the part does not change its state. It also skips the main node of a body that
     /MERGE/RBODY merges into another body. This rule does not report a 0. d2rpick applies this rule only if it could
@@ -232,7 +223,7 @@ def _check_main_nodes(case: RunCase) -> Iterator[Objection]:
     "/RBODY/ON in a later engine file for a body that is rigid from the start",
     (RADIOSS,),
 )
-def _check_never_off(case: RunCase) -> Iterator[Objection]:
+def _check_never_off(case: RunCase) -> Iterator[PlacedMessage]:
     """A rigid body is active by default from the first engine file on. If no earlier engine file has /RBODY/OFF for it,
     the part is rigid from time 0, during the load too. If D2R402 reports a node, this rule does not. Source: Altair's
     help for /RBODY in engine files.
@@ -287,7 +278,7 @@ def _check_never_off(case: RunCase) -> Iterator[Objection]:
     "/RBODY/ON in a later engine file for a body that is rigid already",
     (RADIOSS,),
 )
-def _check_on_again(case: RunCase) -> Iterator[Objection]:
+def _check_on_again(case: RunCase) -> Iterator[PlacedMessage]:
     """A restart keeps a rigid body rigid. If /RBODY/ON activates it again, the motion stays the same, but the internal
     energy of its elements is added again: in one run the model had 173 J instead of 129 J after td. Source: runs
     computed with OpenRadioss.
@@ -331,7 +322,7 @@ def _check_on_again(case: RunCase) -> Iterator[Objection]:
     "no limit of the time step, or a large one, while parts are rigid",
     (RADIOSS,),
 )
-def _check_step_limit(case: RunCase) -> Iterator[Objection]:
+def _check_step_limit(case: RunCase) -> Iterator[PlacedMessage]:
     """If nothing deformable is left, the time step grows by 10 % per cycle without limit, and the release at td occurs
     late. /DTIX limits the time step. This rule also reports a limit above 1 % of the rigid window. It reports a missing
     limit only if every element lies in a rigid part. Source: runs computed with OpenRadioss (td was 0.26 ms late).
@@ -376,7 +367,7 @@ def _has_deformable(case: RunCase, rigid: set[int]) -> bool:
 
 @set_failing(lambda: [make_run(_MIXED)])
 @make_rule_decorator("D2R405", WARNING, "engine files with different /VERS", (RADIOSS,))
-def _check_versions(case: RunCase) -> Iterator[Objection]:
+def _check_versions(case: RunCase) -> Iterator[PlacedMessage]:
     """/VERS defines how the fields of an engine file are read. Source: Altair's help for /VERS. No run has shown that
     different versions cause errors.
 
@@ -396,7 +387,7 @@ def _check_versions(case: RunCase) -> Iterator[Objection]:
             )
 
 
-def _report_flaws(case: RunCase, *, code: str) -> Iterator[Objection]:
+def _report_flaws(case: RunCase, *, code: str) -> Iterator[PlacedMessage]:
     """Yield the flaws of the run that have the given code."""
     for flaw in case.flaws:
         if flaw.code == code:
@@ -418,7 +409,7 @@ def _report_flaws(case: RunCase, *, code: str) -> Iterator[Objection]:
     "a rigid body that no engine file switches, in a run that switches others",
     (RADIOSS,),
 )
-def _check_left_rigid(case: RunCase) -> Iterator[Objection]:
+def _check_left_rigid(case: RunCase) -> Iterator[PlacedMessage]:
     """A rigid body is active from time 0 unless the first engine file has /RBODY/OFF for it. All its nodes stay rigid
     to the end of the run, for example the wheels of a car if the engine files list only the main node of the car body.
     A body is reported if it contains whole parts and no history shows whether these deform (D2R409 reports bodies
@@ -445,7 +436,7 @@ def _check_left_rigid(case: RunCase) -> Iterator[Objection]:
     "a rigid body that no engine file switches, although its parts deform in the history",
     (RADIOSS,),
 )
-def _check_left_rigid_deforming(case: RunCase) -> Iterator[Objection]:
+def _check_left_rigid_deforming(case: RunCase) -> Iterator[PlacedMessage]:
     """The rigid body is active from time 0 (D2R408), but its parts have internal energy in the history. They deform in
     the reference run, and cannot deform in this run. If the history contains their energy and it is zero, the parts are
     meant to be rigid, and d2rpick reports nothing.
@@ -476,7 +467,7 @@ def _find_left_rigid_parts(
 @set_passing(lambda: [GOOD_RUN, _make_run_with(_NODES, _write_wall(8))])
 @set_failing(
     lambda: [
-        _make_run_with("/GRNOD/BOX/8\nbox\n", _write_row(1), _write_wall(8)),
+        _make_run_with("/GRNOD/BOX/8\nbox\n", write_row(1), _write_wall(8)),
         _make_run_with(_write_velocity(8)),
         _make_run_with(_PLACES, "/TRANSFORM/TRA/1\n", _write_wall(0, 0, 0.1)),
     ]
@@ -487,10 +478,10 @@ def _find_left_rigid_parts(
     "a rigid wall, an initial velocity or a rigid body whose nodes are unknown",
     (RADIOSS,),
 )
-def _report_unknown_nodes(case: RunCase) -> Iterator[Objection]:
+def _report_unknown_nodes(case: RunCase) -> Iterator[PlacedMessage]:
     """D2R406 and D2R407 check what rigid walls and initial velocities do to the nodes of rigid bodies. They evaluate
     node groups defined by nodes, parts and subsets, and the distance from a wall. They do not evaluate other groups,
-    nodes moved by /TRANSFORM, and ids of a //SUBMODEL.
+    nodes moved by /TRANSFORM, or ids inside a //SUBMODEL.
 
     Fix: Define the group by /GRNOD/NODE, /GRNOD/PART or /GRNOD/SUBSET, or check walls and velocities yourself.
     """
@@ -519,7 +510,7 @@ def _report_unknown_nodes(case: RunCase) -> Iterator[Objection]:
     "a rigid wall that does not act on the nodes of a switched rigid body",
     (RADIOSS,),
 )
-def _check_walls(case: RunCase) -> Iterator[Objection]:
+def _check_walls(case: RunCase) -> Iterator[PlacedMessage]:
     """The starter removes the nodes of every /RBODY with Ikrem 0 from all /RWALL, even if the engine deactivates the
     body in the first engine file (warning 446). These nodes can pass through the wall. OpenRadioss applies the Ikrem of
     the /RBODY with the highest id to all bodies. With Ikrem 1 the wall acts on the nodes while the body is off, but not
@@ -553,7 +544,7 @@ def _check_walls(case: RunCase) -> Iterator[Objection]:
     "an initial velocity for the nodes of a switched rigid body but not for its main node",
     (RADIOSS,),
 )
-def _check_velocities(case: RunCase) -> Iterator[Objection]:
+def _check_velocities(case: RunCase) -> Iterator[PlacedMessage]:
     """The starter gives all nodes of an /RBODY the velocity of its main node, even if the engine deactivates the body
     in the first engine file. If the node group of /INIVEL lacks the main node, the body begins at rest, and the solver
     issues no message. An /INIV in an engine file moves an active body by its main node alone, and an inactive body by
@@ -567,7 +558,7 @@ def _check_velocities(case: RunCase) -> Iterator[Objection]:
 def _make_sensed_run(*lines: str) -> Example:
     """Return a run in which a /SENSOR/TIME with the given lines switches the body."""
     deck = write_starter_deck().replace(
-        _write_row(1808, 0)[:-1], _write_row(1808, 5)[:-1]
+        write_row(1808, 0)[:-1], write_row(1808, 5)[:-1]
     )
     return make_run(
         write_engine_files(("0.2", "")),
@@ -578,17 +569,17 @@ def _make_sensed_run(*lines: str) -> Example:
 @set_passing(
     lambda: [
         GOOD_RUN,
-        _make_sensed_run(_write_row(0.02, width=20), _write_row(0.09, width=20)),
+        _make_sensed_run(write_row(0.02, width=20), write_row(0.09, width=20)),
     ]
 )
-@set_failing(lambda: [_make_sensed_run(_write_row(0.02, 0.09, width=20))])
+@set_failing(lambda: [_make_sensed_run(write_row(0.02, 0.09, width=20))])
 @make_rule_decorator(
     "D2R412",
     WARNING,
     "a /SENSOR/TIME with a second number on the line of Tdelay",
     (RADIOSS,),
 )
-def _check_sensor_stop(case: RunCase) -> Iterator[Objection]:
+def _check_sensor_stop(case: RunCase) -> Iterator[PlacedMessage]:
     """Tstop has a line of its own below Tdelay. Radioss does not read a number after Tdelay on the same line, so the
     sensor stays active to the end, and the body that it switches stays deformable. Source: the format files of
     OpenRadioss, and runs computed with it.

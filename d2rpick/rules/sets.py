@@ -9,17 +9,20 @@ from d2rpick.base.errors import list_names
 from d2rpick.deck.ls_dyna_columns import SENSOR_CONTROL
 from d2rpick.deck.ls_dyna_parts import Entities, read_entities
 from d2rpick.deck.switching import BY_SENSOR, BY_TIME, SwitchHeader, SwitchSet, Unit
-from d2rpick.rules.base import BOTH, ERROR, WARNING, Case, Objection
+from d2rpick.rules.base import BOTH, ERROR, WARNING, Case, PlacedMessage
+from d2rpick.rules.example import (
+    Example,
+    make_deck,
+    write_automatic_card,
+    write_contact,
+)
 from d2rpick.rules.rule import (
     BACK,
     PASS,
     THERE,
-    Example,
-    make_deck,
     make_rule_decorator,
     set_failing,
     set_passing,
-    write_automatic_card,
 )
 
 if TYPE_CHECKING:
@@ -43,6 +46,7 @@ _WALL: Final = (
     "0.0       0.0       0.0\n"
 )
 _CONTROL: Final = "*SENSOR_CONTROL\n         5   DEF2RIG{:10d}        ON\n         3\n"
+_FLOOR: Final = write_contact("SURFACE_TO_SURFACE")
 # Arguments of `d2rpick rollover` for the history of a box that lands on its edge and rattles there.
 _LANDING: Final = "--drop 0.2 --tilt 20 --mesh 4 --ground-stiffness 2e6 --t-end 0.7 --dt 5e-4 --write-as matsum"
 
@@ -68,14 +72,6 @@ def _make_force_deck(
     return make_deck(contact + card)
 
 
-def _write_contact(name: str) -> str:
-    zeros = f"{0:10d}" * 8 + "\n"
-    return f"*CONTACT_AUTOMATIC_{name}_ID\n         7floor\n" + 3 * zeros
-
-
-_FLOOR: Final = _write_contact("SURFACE_TO_SURFACE")
-
-
 _with_floor = partial(_make_force_deck, contact=_FLOOR)
 
 
@@ -83,7 +79,7 @@ _with_floor = partial(_make_force_deck, contact=_FLOOR)
     lambda: [make_deck(THERE + write_automatic_card(1, "0.09", deformable=["1"]))]
 )
 @make_rule_decorator("D2R004", ERROR, "SWSET used twice")
-def _check_unique_ids(case: Case) -> Iterator[Objection]:
+def _check_unique_ids(case: Case) -> Iterator[PlacedMessage]:
     """Each *DEFORMABLE_TO_RIGID_AUTOMATIC is a switch set with its own id, to which RELSW refers.
 
     Fix: Give every switch set its own SWSET.
@@ -111,7 +107,7 @@ def _check_unique_ids(case: Case) -> Iterator[Objection]:
     ERROR,
     "RELSW/PAIRED not mutual, not of opposite sign, or CODEs of different families",
 )
-def _check_pairs(case: Case) -> Iterator[Objection]:
+def _check_pairs(case: Case) -> Iterator[PlacedMessage]:
     """Paired sets act in turn as a contact or wall force begins and ends. Each set names the other in RELSW. PAIRED is
     1 for the set that acts first and -1 for the other. Their CODEs are 1 and 3 (rigid wall) or 2 and 4 (contact). Sets
     with CODE 3 or 4 on the D2R side and 1 or 2 on the R2D side, paired or not, are the wrong way round: the parts are
@@ -213,7 +209,7 @@ def _describe_mismatch(first: SwitchHeader, second: SwitchHeader) -> str:
     ]
 )
 @make_rule_decorator("D2R006", WARNING, "PAIRED together with CODE 0")
-def _check_timed_pairs(case: Case) -> Iterator[Objection]:
+def _check_timed_pairs(case: Case) -> Iterator[PlacedMessage]:
     """Two paired switch sets act alternately, triggered by a force. A window defined by times (CODE 0) needs only two
     unpaired sets.
 
@@ -262,11 +258,11 @@ def _find_force_headers(case: Case, codes: set[int]) -> Iterator[SwitchHeader]:
 @make_rule_decorator(
     "D2R007", ERROR, "ENTNO names no contact or rigid wall of the deck"
 )
-def _check_entity_exists(case: Case) -> Iterator[Objection]:
-    """CODE 2 and 4 wait for the force of contact ENTNO, CODE 1 and 3 for the force of rigid wall ENTNO. If it does not
-    exist, it never has a force. ENTNO is the id of *CONTACT_..._ID. Contacts without ids are counted in the order of
-    their definition (no available source confirms this). d2rpick applies this rule only if it could read the whole deck
-    and the deck has parts. Source: vendor keyword data.
+def _check_entity_exists(case: Case) -> Iterator[PlacedMessage]:
+    """CODE 2 and 4 wait for the force of contact ENTNO, CODE 1 and 3 for the force of rigid wall ENTNO. A contact or
+    wall that does not exist never has a force. ENTNO is the id of *CONTACT_..._ID. Contacts without ids are counted in
+    the order of their definition (no available source confirms this). d2rpick applies this rule only if it could read
+    the whole deck and the deck has parts. Source: vendor keyword data.
 
     Fix: Set ENTNO to the id of a contact or rigid wall of the deck.
     """
@@ -275,7 +271,7 @@ def _check_entity_exists(case: Case) -> Iterator[Objection]:
             header for header in _find_force_headers(case, codes) if header.entno.value
         ]
         entities = read_entities(case.deck, keyword) if headers else None
-        if entities is None or not (entities.all_known and case.whole):
+        if entities is None or not (entities.all_known and case.knows_all_parts):
             continue
         for header in headers:
             if entities.named(header.entno.value) is None:
@@ -297,19 +293,19 @@ def _check_entity_exists(case: Case) -> Iterator[Objection]:
     lambda: [
         _with_floor(4, 7),
         _make_force_deck(2, 1, contact=_BY_ORDER),
-        _make_force_deck(3, 7, contact=_write_contact("GENERAL") + _WALL),
+        _make_force_deck(3, 7, contact=write_contact("GENERAL") + _WALL),
     ]
 )
 @set_failing(
     lambda: [
-        _make_force_deck(4, 7, contact=_write_contact("GENERAL")),
-        _make_force_deck(2, 7, contact=_write_contact("SINGLE_SURFACE")),
+        _make_force_deck(4, 7, contact=write_contact("GENERAL")),
+        _make_force_deck(2, 7, contact=write_contact("SINGLE_SURFACE")),
     ]
 )
 @make_rule_decorator(
     "D2R008", ERROR, "ENTNO names a contact whose force cannot trigger a switch"
 )
-def _check_entity_triggers(case: Case) -> Iterator[Objection]:
+def _check_entity_triggers(case: Case) -> Iterator[PlacedMessage]:
     """Only the force of surface-to-surface and nodes-to-surface contacts triggers a switch. A contact of type GENERAL
     or SINGLE_SURFACE never triggers a switch, so the part keeps its state, and the solver issues no message. Source:
     Vol I, Remark 1, as quoted by a public drop tool, and the vendor's help on OFFSET, which lists the same types. Not
@@ -375,14 +371,14 @@ def _make_sensor_deck(control: str) -> Example:
 @make_rule_decorator(
     "D2R012", ERROR, "CODE 5 without a *SENSOR_CONTROL that switches the set"
 )
-def _check_sensor_control(case: Case) -> Iterator[Objection]:
+def _check_sensor_control(case: Case) -> Iterator[PlacedMessage]:
     """A set with CODE 5 is switched by a *SENSOR_CONTROL with TYPE DEF2RIG whose TYPEID is its SWSET. Without one it
     never switches. d2rpick applies this rule only if it could read the whole deck and the deck has parts. D2R302
     reports when the sensor switches. Source: vendor keyword data.
 
     Fix: Add a *SENSOR_CONTROL with TYPE DEF2RIG and TYPEID equal to SWSET, or choose another CODE.
     """
-    if not case.whole:
+    if not case.knows_all_parts:
         return
     controlled = {
         number
@@ -429,7 +425,7 @@ def _make_delayed_deck(wait: str) -> Example:
     ]
 )
 @make_rule_decorator("D2R009", WARNING, "TIME3 is 0 with a contact CODE")
-def _check_delay(case: Case) -> Iterator[Objection]:
+def _check_delay(case: Case) -> Iterator[PlacedMessage]:
     """TIME3 is the time after a switch during which the set makes no further switch. A contact force begins and ends
     many times in one impact, so with TIME3 = 0 the parts switch back and forth. In a pair, one of the two sets needs a
     TIME3 above 0. Source: the vendor's keyword data define TIME3; a public drop tool reports the
@@ -458,7 +454,7 @@ def _check_delay(case: Case) -> Iterator[Objection]:
 @make_rule_decorator(
     "D2R010", ERROR, "CODE 3 or 4 without a contact or rigid wall (ENTNO 0)"
 )
-def _check_entity_named(case: Case) -> Iterator[Objection]:
+def _check_entity_named(case: Case) -> Iterator[PlacedMessage]:
     """The set switches when the force of ENTNO is not zero. ENTNO 0 names no contact or rigid wall, so there is no such
     force. Source: vendor keyword data. No available source confirms what the solver does with 0.
 
@@ -483,7 +479,7 @@ def _make_landing_deck(wait: str) -> Example:
 @make_rule_decorator(
     "D2R208", WARNING, "a switch by a force that chatters in the history", BOTH
 )
-def _check_chatter(case: Case) -> Iterator[Objection]:
+def _check_chatter(case: Case) -> Iterator[PlacedMessage]:
     """A contact force begins and ends many times in one impact. If the history has the force of the contact or wall, or
     if it has the part momenta and the deck has only one contact or wall, d2rpick evaluates the switches over the
     history. Rigid windows shorter than 10 % of the longest window are not flights but chatter. There is no chatter if

@@ -7,17 +7,23 @@ from typing import TYPE_CHECKING, Final
 from d2rpick.base.errors import name_units
 from d2rpick.base.graph import find_reachable
 from d2rpick.deck.ls_dyna_parts import DeckParts, find_element_cards
-from d2rpick.rules.base import BOTH, ERROR, INFO, WARNING, Case, Objection, group_values
+from d2rpick.rules.base import (
+    BOTH,
+    ERROR,
+    INFO,
+    WARNING,
+    Case,
+    PlacedMessage,
+    group_values,
+)
+from d2rpick.rules.example import Example, make_deck, write_automatic_card
 from d2rpick.rules.rule import (
     BACK,
     PASS,
     THERE,
-    Example,
-    make_deck,
     make_rule_decorator,
     set_failing,
     set_passing,
-    write_automatic_card,
 )
 
 if TYPE_CHECKING:
@@ -100,7 +106,7 @@ def _has_unknown_members(case: Case, *, to_rigid: bool) -> bool:
 @make_rule_decorator(
     "D2R103", ERROR, "a part switched back although no card made it rigid"
 )
-def _check_never_rigid(case: Case) -> Iterator[Objection]:
+def _check_never_rigid(case: Case) -> Iterator[PlacedMessage]:
     """An R2D line for a part that no D2R line has made rigid before has no effect. Usually a part id is wrong on one of
     the two cards.
 
@@ -124,7 +130,7 @@ def _check_never_rigid(case: Case) -> Iterator[Objection]:
 @set_passing(lambda: [PASS, Example(_RESTART.format(1, 2))])
 @set_failing(lambda: [Example(_RESTART.format(1, 1))])
 @make_rule_decorator("D2R117", ERROR, "a part made rigid and deformable in one restart")
-def _check_both_ways(case: Case) -> Iterator[Objection]:
+def _check_both_ways(case: Case) -> Iterator[PlacedMessage]:
     """*RIGID_DEFORMABLE_D2R and *RIGID_DEFORMABLE_R2D of one restart act together when the restart begins. A part on
     both cards has no rigid window, or stays rigid to the end. No available source confirms which of the two happens.
 
@@ -149,7 +155,7 @@ def _check_both_ways(case: Case) -> Iterator[Objection]:
     lambda: [make_deck(THERE), make_deck("*DEFORMABLE_TO_RIGID\n         1\n")]
 )
 @make_rule_decorator("D2R104", INFO, "a part made rigid and never switched back", BOTH)
-def _check_never_back(case: Case) -> Iterator[Objection]:
+def _check_never_back(case: Case) -> Iterator[PlacedMessage]:
     """The part stays rigid to the end of the run, unless a restart deck switches it back. It does not deform in the
     next contact.
 
@@ -193,13 +199,13 @@ def _check_never_back(case: Case) -> Iterator[Objection]:
     ERROR,
     "part or part set not in the deck (only if every include file was read)",
 )
-def _check_ids_exist(case: Case) -> Iterator[Objection]:
+def _check_ids_exist(case: Case) -> Iterator[PlacedMessage]:
     """A switching card names a part, part set or lead part that no *PART or *SET_PART defines, or a part set without
     parts. d2rpick applies this rule only if it could read the whole deck and the deck has parts.
 
     Fix: Correct the id, and check the id offsets of *INCLUDE_TRANSFORM.
     """
-    for card in case.sets if case.whole else ():
+    for card in case.sets if case.knows_all_parts else ():
         missing = group_values(
             absent
             for line in card.switched
@@ -234,7 +240,7 @@ def _list_nearest(number: int, parts: DeckParts) -> str:
     from heapq import nsmallest  # Imported here to keep start-up fast.
 
     near = sorted(
-        nsmallest(_NEAREST, parts.materials, key=lambda part: abs(part - number))
+        nsmallest(_NEAREST, parts.material_by_part, key=lambda part: abs(part - number))
     )
     listed = (
         f"{part} {parts.titles[part]!r}" if parts.titles[part] else str(part)
@@ -256,14 +262,16 @@ def _find_absent(line: Switched, parts: DeckParts) -> Iterator[tuple[str, int]]:
             members = parts.members(line.part.value) or ()
         else:
             members = (line.part.value,)
-        yield from (("part", part) for part in members if part not in parts.materials)
-    if line.lead and line.lead.value and line.lead.value not in parts.materials:
+        yield from (
+            ("part", part) for part in members if part not in parts.material_by_part
+        )
+    if line.lead and line.lead.value and line.lead.value not in parts.material_by_part:
         yield "lead part", line.lead.value
 
 
 @set_failing(lambda: [make_deck(_RIGID + BACK)])
 @make_rule_decorator("D2R107", WARNING, "a *MAT_RIGID part switched to deformable")
-def _check_always_rigid(case: Case) -> Iterator[Objection]:
+def _check_always_rigid(case: Case) -> Iterator[PlacedMessage]:
     """A part with *MAT_RIGID is rigid from the start and cannot become deformable.
 
     Fix: Give the part its deformable material, and make it rigid with a D2R line.
@@ -290,7 +298,7 @@ def _check_always_rigid(case: Case) -> Iterator[Objection]:
 @make_rule_decorator(
     "D2R108", ERROR, "several parts made rigid with LRB 0 although they share nodes"
 )
-def _check_shared_nodes(case: Case) -> Iterator[Objection]:
+def _check_shared_nodes(case: Case) -> Iterator[PlacedMessage]:
     """With LRB 0 each part becomes a rigid body of its own. If two rigid bodies share nodes, both prescribe the motion
     of these nodes, which is a contradiction.
 
@@ -357,7 +365,7 @@ def _is_rigid_together(case: Case, first: Unit, second: Unit) -> bool:
 @make_rule_decorator(
     "D2R116", WARNING, "solids whose stresses do not rotate with the rigid body", BOTH
 )
-def _check_unturned_stresses(case: Case) -> Iterator[Objection]:
+def _check_unturned_stresses(case: Case) -> Iterator[PlacedMessage]:
     """While a part is rigid, the solver does not compute its elements. Formulations without a co-rotational frame keep
     their stresses in global axes, so after a rotation they spring back in the wrong direction. Parts that are rigid
     from the start have no stress, so d2rpick does not report them. Source for Radioss: Altair's help (bricks with
@@ -389,7 +397,7 @@ def _check_unturned_stresses(case: Case) -> Iterator[Objection]:
         yield affected_parts[0][1], f"{problem}: {why}; use a co-rotational formulation"
 
 
-def _report_unswitchable(case: Case, *, flows: bool) -> Iterator[Objection]:
+def _report_unswitchable(case: Case, *, flows: bool) -> Iterator[PlacedMessage]:
     """Yield the parts that must not be switched but that a card makes rigid at some time."""
     if case.sets:
         reasons = {
@@ -428,7 +436,7 @@ def _make_law_deck(law: str) -> Example:
 @make_rule_decorator(
     "D2R118", ERROR, "a switched part whose material flows through its mesh", BOTH
 )
-def _check_flowing_material(case: Case) -> Iterator[Objection]:
+def _check_flowing_material(case: Case) -> Iterator[PlacedMessage]:
     """Material flows through ALE and Eulerian elements (LS-DYNA: ELFORM 5, 6, 7, 11, 12; Radioss: /ALE/MAT,
     /EULER/MAT), so there is no body to make rigid. Source: the vendor's keyword data and Altair's help.
 
@@ -448,7 +456,7 @@ def _check_flowing_material(case: Case) -> Iterator[Objection]:
 @make_rule_decorator(
     "D2R119", WARNING, "a switched part whose law keeps a stress-free reference", BOTH
 )
-def _check_reference_laws(case: Case) -> Iterator[Objection]:
+def _check_reference_laws(case: Case) -> Iterator[PlacedMessage]:
     """Hyperelastic and total Lagrangian laws compute the stress from the deformation since the start, not from the
     stress at the time at which the part was made rigid. After the switch back the part may have a stress that it did
     not have before. In Radioss, the rule applies to hyperelastic laws and to solids with Ismstr 10 to 12. Source: the

@@ -14,22 +14,24 @@ from d2rpick.deck.switching import (
     SwitchSet,
     SwitchWindow,
 )
-from d2rpick.rules.base import BOTH, ERROR, WARNING, Case, Objection, group_values
-from d2rpick.rules.rule import (
-    BACK,
+from d2rpick.rules.base import BOTH, ERROR, WARNING, Case, PlacedMessage, group_values
+from d2rpick.rules.example import (
     END,
-    GOOD,
     HEAD,
     PARTS,
-    PASS,
-    THERE,
     Example,
     make_deck,
-    make_rule_decorator,
     make_window,
+    write_automatic_card,
+)
+from d2rpick.rules.rule import (
+    BACK,
+    GOOD,
+    PASS,
+    THERE,
+    make_rule_decorator,
     set_failing,
     set_passing,
-    write_automatic_card,
 )
 
 if TYPE_CHECKING:
@@ -71,7 +73,7 @@ _WITHOUT_END: Final = HEAD.replace("*CONTROL_TERMINATION\n       0.2\n", "")
     ]
 )
 @make_rule_decorator("D2R101", ERROR, "switch time outside [0, ENDTIM)")
-def _check_times_in_run(case: Case) -> Iterator[Objection]:
+def _check_times_in_run(case: Case) -> Iterator[PlacedMessage]:
     """TIME1 is the switching time for CODE 0, and the earliest switching time for CODE 1 to 4. If TIME1 is at or after
     ENDTIM of *CONTROL_TERMINATION, the set never switches. With CODE 1 to 4 it does not switch after TIME2 either.
 
@@ -131,7 +133,7 @@ def _is_lost(window: SwitchWindow) -> bool:
 @make_rule_decorator(
     "D2R102", ERROR, "a part switched back before, or when, it is made rigid", BOTH
 )
-def _check_times_in_order(case: Case) -> Iterator[Objection]:
+def _check_times_in_order(case: Case) -> Iterator[PlacedMessage]:
     """The R2D switch of a part must come after its D2R switch. The solver does not sort the switches by time.
 
     Fix: Make td later than tr. Perhaps the two times were exchanged.
@@ -158,7 +160,7 @@ def _check_times_in_order(case: Case) -> Iterator[Objection]:
 @make_rule_decorator(
     "D2R105", ERROR, "both times of a window are 0 (decimals lost in writing)"
 )
-def _check_zero_times(case: Case) -> Iterator[Objection]:
+def _check_zero_times(case: Case) -> Iterator[PlacedMessage]:
     """Programs that print times with one decimal write every time below 0.05 as 0.0. Two sets that both switch at 0 are
     a sign of this.
 
@@ -185,7 +187,7 @@ def _check_zero_times(case: Case) -> Iterator[Objection]:
     WARNING,
     "*DATABASE_GLSTAT/_MATSUM missing, or their DT above (td-tr)/200",
 )
-def _check_sampling(case: Case) -> Iterator[Objection]:
+def _check_sampling(case: Case) -> Iterator[PlacedMessage]:
     """Switching times are chosen from the internal energy of a reference run: glstat contains the energy of the whole
     model, and matsum contains the energy of each part. If the output interval is too long, the energy at tr and td is
     not known well enough. A switched run is compared with its reference run by the same output (verify --switched),
@@ -223,7 +225,7 @@ def _check_sampling(case: Case) -> Iterator[Objection]:
             )
             why = f"expected at most {limit:g}: {_INTERVALS} intervals in the shortest rigid window"
             yield value.field, f"{problem} ({why}); reduce DT"
-    whole = case.whole or (case.parts.all_known and case.end_time is not None)
+    whole = case.knows_all_parts or (case.parts.all_known and case.end_time is not None)
     if missing and whole:
         problem = (
             f"the deck has no {' and no '.join(missing)}, so its run writes no energies: no times can be chosen from "
@@ -262,7 +264,7 @@ def _find_timed(case: Case) -> list[tuple[SwitchSet, SwitchHeader]]:
 @make_rule_decorator(
     "D2R114", ERROR, "all switching times are equal (decimals lost in writing)"
 )
-def _check_equal_times(case: Case) -> Iterator[Objection]:
+def _check_equal_times(case: Case) -> Iterator[PlacedMessage]:
     """Programs that print times with one decimal write 0.0 for every time below 0.05, and 0.1 for 0.07 and 0.13. If all
     cards switch at the same time, the decimals were probably lost in this way. Source: a public drop tool wrote such
     decks.
@@ -301,13 +303,17 @@ def _find_mixed_units(times: list[float], end: float, run_end: str) -> str | Non
     latest = max(later)
     earliest = min(later)
     if 10 * end < latest < _THOUSAND * end and earliest >= end:
-        direction = "later: milliseconds for seconds"
+        size = "larger: milliseconds for seconds"
     elif end / 50 <= _THOUSAND * latest < end:
-        direction = "earlier: seconds for milliseconds"
+        size = "smaller: seconds for milliseconds"
     else:
         return None
-    problem = f"the switching times reach {latest:g} but {run_end}, about 1000 times {direction}"
-    return f"{problem}? give both in the same unit"
+    problem = (
+        f"the switching times reach only {latest:g}"
+        if size.startswith("smaller")
+        else f"the switching times reach {latest:g}"
+    )
+    return f"{problem} but {run_end}: they are about 1000 times {size}? give both in the same unit"
 
 
 @set_passing(
@@ -325,7 +331,7 @@ def _find_mixed_units(times: list[float], end: float, run_end: str) -> str | Non
     ERROR,
     "the switching times are about 1000 times the termination time, or 1/1000 of it",
 )
-def _check_units_of_deck(case: Case) -> Iterator[Objection]:
+def _check_units_of_deck(case: Case) -> Iterator[PlacedMessage]:
     """The deck seems to mix seconds and milliseconds: the switching times lie outside the run or in its first 1/1000,
     but would lie in the run if they were divided or multiplied by 1000. Files contain no unit names, so d2rpick infers
     this from the magnitudes. D2R101 does not report these times again.
@@ -357,7 +363,7 @@ def _make_good_pair() -> Example:
     return _make_pair_deck(*_GOOD_PAIR)
 
 
-def _report_faults(case: Case, rule_id: str) -> Iterator[Objection]:
+def _report_faults(case: Case, rule_id: str) -> Iterator[PlacedMessage]:
     """Yield the problems that one rule finds in the energy history; parts on the same card share a problem."""
     objections: list[tuple[tuple[SwitchSet, str, str], int]] = []
     for judged_window, judgement in case.judgements:
@@ -384,7 +390,7 @@ def _report_faults(case: Case, rule_id: str) -> Iterator[Objection]:
     "deck and history seem to have different time units (their ends differ by a power of 1000)",
     BOTH,
 )
-def _check_units_of_history(case: Case) -> Iterator[Objection]:
+def _check_units_of_history(case: Case) -> Iterator[PlacedMessage]:
     """The deck may be in microseconds or milliseconds, and the history in seconds. Files contain no unit names, so
     d2rpick compares the two end times. If D2R115 or D2R207 reports the same mistake, this rule does not.
 
@@ -420,7 +426,7 @@ def _check_units_of_history(case: Case) -> Iterator[Objection]:
     "the switching times are about 1000 times the times in the history, or 1/1000 of them",
     BOTH,
 )
-def _check_times_of_history(case: Case) -> Iterator[Objection]:
+def _check_times_of_history(case: Case) -> Iterator[PlacedMessage]:
     """Deck and history seem to have different time units: the windows would lie in the history if they were divided or
     multiplied by 1000. Files contain no unit names, so d2rpick infers this from the magnitudes. Other times outside the
     history are reported by D2R205.
@@ -454,7 +460,7 @@ def _check_times_of_history(case: Case) -> Iterator[Objection]:
 @make_rule_decorator(
     "D2R201", ERROR, "the error of the frozen deformation is above --tolerance", BOTH
 )
-def _check_locked_in_error(case: Case) -> Iterator[Objection]:
+def _check_locked_in_error(case: Case) -> Iterator[PlacedMessage]:
     """While a part is rigid, it keeps the deformation that it had at tr, and it springs back at td. This deformation
     should equal the deformation in the reference run at td: same energy, same direction. d2rpick judges the parts that
     share a window together, as d2rpick verify does, or the whole model if the history has no parts. It uses the
@@ -470,7 +476,7 @@ def _check_locked_in_error(case: Case) -> Iterator[Objection]:
 @make_rule_decorator(
     "D2R202", ERROR, "the deformations at tr and td have opposite directions", BOTH
 )
-def _check_sign(case: Case) -> Iterator[Objection]:
+def _check_sign(case: Case) -> Iterator[PlacedMessage]:
     """In each oscillation cycle a part passes every energy level twice in tension and twice in compression. If the
     frozen deformation has the wrong sign, the vibration after td is worse than without any frozen deformation. The sign
     is known only if a vibration model (oscillator, modal or swings) describes the history.
@@ -488,7 +494,7 @@ def _check_sign(case: Case) -> Iterator[Objection]:
     "poor td: more than half of the vibration energy is kinetic",
     BOTH,
 )
-def _check_kinetic_share(case: Case) -> Iterator[Objection]:
+def _check_kinetic_share(case: Case) -> Iterator[PlacedMessage]:
     """A rigid part does not vibrate, so the kinetic fraction of the vibration energy at td is lost, whatever tr is.
     Near a maximum of the internal energy hardly any vibration energy is kinetic. If D2R209 reports the pair, this rule
     does not.
@@ -506,7 +512,7 @@ def _check_kinetic_share(case: Case) -> Iterator[Objection]:
 )
 @set_failing(lambda: [_make_pair_deck(".0128853", "0.064")])
 @make_rule_decorator("D2R209", ERROR, "a pair with a grade below --min-quality", BOTH)
-def _check_quality(case: Case) -> Iterator[Objection]:
+def _check_quality(case: Case) -> Iterator[PlacedMessage]:
     """The pair is admissible, but the history shows that the motion or the vibration after td will be wrong, or does
     not show that they will be right. d2rpick judges the pair in the same way as d2rpick verify. With --min-quality
     good, it also reports fair pairs; with --min-quality poor, it reports no pair.
@@ -521,9 +527,9 @@ def _check_quality(case: Case) -> Iterator[Objection]:
 @make_rule_decorator(
     "D2R210", ERROR, "a pair beyond a limit, such as --max-residual", BOTH
 )
-def _check_limits(case: Case) -> Iterator[Objection]:
-    """The pair exceeds a limit that was set with --max-residual or --max-kinetic-share, or the history does not show
-    whether it does. With the same limit, d2rpick suggest does not recommend such a pair.
+def _check_limits(case: Case) -> Iterator[PlacedMessage]:
+    """The pair exceeds a limit that was set by an option, such as --max-residual or --max-kinetic-share, or the history
+    does not show whether it does. With the same limit, d2rpick suggest does not recommend such a pair.
 
     Fix: Use the pair that the finding names, or one that d2rpick suggest recommends with this limit.
     """
@@ -535,7 +541,7 @@ def _check_limits(case: Case) -> Iterator[Objection]:
 @make_rule_decorator(
     "D2R204", ERROR, "tr before the load is over, or td after the next contact", BOTH
 )
-def _check_flight(case: Case) -> Iterator[Objection]:
+def _check_flight(case: Case) -> Iterator[PlacedMessage]:
     """If tr lies before the end of the load, an equal energy is a coincidence, and the motion of the body is wrong. If
     td lies after the next contact, a rigid part does not deform in this contact. d2rpick finds the start and end of the
     flight from the momentum or the energy in the history, or uses the time of --after. It also reports a history that
@@ -552,7 +558,7 @@ def _check_flight(case: Case) -> Iterator[Objection]:
 @make_rule_decorator(
     "D2R205", ERROR, "time or part that the history does not contain", BOTH
 )
-def _check_in_history(case: Case) -> Iterator[Objection]:
+def _check_in_history(case: Case) -> Iterator[PlacedMessage]:
     """The energy outside the history is unknown, and so is the energy of a part that the history does not contain.
     d2rpick also reports a td within the first ten states if 1000 times this td lies in the history, because this td
     seems to have another unit.

@@ -124,8 +124,10 @@ class GrowingEvidence:
         has_momentum = ~np.isnan(columns[:, 2])
         for stretch in find_stretches(has_momentum):
             if stretch.start > 0 or parts not in self._going_on:
-                self._going_on[parts] = GrowingWitness(members, parts)
-                self.witnesses.append(self._going_on[parts])
+                new_witness = GrowingWitness(members, parts)
+                self._going_on[parts] = new_witness
+                self.witnesses.append(new_witness)
+                # The evidence for the model is the last.
                 self.witnesses.sort(key=lambda witness: witness.parts is None)
             self._going_on[parts].add(columns[stretch], *precisions)
         if not has_momentum[-1:].all():
@@ -177,8 +179,10 @@ class GrowingEvidence:
     def _stores_no_energy(self, start: float, now: float) -> bool:
         """Return True if the internal energy in a time span is only a rounding error of the kinetic energy."""
         history = self.history
-        internal = np.abs(history.between(start, now)[1]).max()
-        balance, kinetic = history.balance, 0.0
+        _, energy = history.between(start, now)
+        internal = np.abs(energy).max()
+        balance = history.balance
+        kinetic = 0.0
         if balance is not None and balance.kinetic is not None:
             inside = find_window(balance.time, start, now)
             kinetic = balance.kinetic[inside].max(initial=0.0)
@@ -214,8 +218,10 @@ class GrowingEvidence:
         starts = [time]
         for witness in self.witnesses:
             state = int(np.searchsorted(witness.time, time, side="right")) - 1
-            if state >= 0 and time <= witness.time[-1]:
-                starts.append(float(witness.time[witness.free[state]]))
+            if state < 0 or time > witness.time[-1]:
+                continue
+            first = witness.free[state]
+            starts.append(float(witness.time[first]))
         return min(starts)
 
     def pauses(self, since: float) -> tuple[tuple[float, float], ...]:

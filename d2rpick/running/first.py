@@ -58,8 +58,12 @@ def first_card(
     if inventory.solver == "radioss":
         chosen = chosen or find_parts_off(read_run(path))
     if not chosen:
+        is_radioss = inventory.solver == "radioss"
+        lack = (
+            f", and {path} deactivates no rigid body (/RBODY/OFF)" if is_radioss else ""
+        )
         raise ArgumentError(
-            f"no parts were given, and {path} deactivates no rigid body (/RBODY/OFF); name them with `parts`"
+            f"no parts were given{lack}; name those to be switched with `parts`"
         )
     refuse_held(path, inventory, chosen)
     needed = _choose_wait(path, inventory, wait)

@@ -120,29 +120,36 @@ class _Motion:
 
     def _begin(self, rows: Samples) -> None:
         """Begin to follow a motion that is first detected at the last of its states."""
-        time, values = rows[:, 0], rows[:, 1]
-        distance = np.abs(values - values[-1])
-        self._extreme = len(rows) - 1
-        self._turn = self._extreme - int(np.argmax(distance[::-1]))
-        self._sign = int(np.sign(values[-1] - values[self._turn]))
-        now = float(time[-1])
+        values = rows[:, 1]
+        last = len(rows) - 1
+        distances = np.abs(values - values[last])
+        # The last extremum is the latest of the states whose values differ most from the last one.
+        states_since = int(np.argmax(distances[::-1]))
+        self._extreme = last
+        self._turn = last - states_since
+        self._sign = int(np.sign(values[last] - values[self._turn]))
+        now = float(rows[last, 0])
         self._swings.append(_HalfPeriod(self, now, now, now))
 
     def _measure(self, rows: Samples, now: float) -> _HalfPeriod:
         """Measure the half period from the last extremum to the current extreme value, detected at ``now``."""
-        time, values = rows[:, 0], rows[:, 1]
-        distance = np.abs(values - values[0])
-        whole = distance[-1]
-        is_low = distance <= _INNER * whole
+        time = rows[:, 0]
+        values = rows[:, 1]
+        changes = np.abs(values - values[0])
+        whole_change = changes[-1]
+        # The inner part of the change is not affected by the states near the extrema, where the values hardly change.
+        is_low = changes <= _INNER * whole_change
         low = int(np.flatnonzero(is_low)[-1])
-        is_high = distance[low:] >= (1 - _INNER) * whole
+        is_high = changes[low:] >= (1 - _INNER) * whole_change
         high = low + int(np.argmax(is_high))
         inner_time = float(time[high] - time[low])
         half = self._factor * inner_time / _INNER_TIME
-        strength = float(whole) / half
-        begin, end = time[[0, -1]].tolist()
-        self._swings.append(_HalfPeriod(self, begin, end, now, half, strength))
-        return self._swings[-1]
+        strength = float(whole_change) / half
+        begin = float(time[0])
+        end = float(time[-1])
+        half_period = _HalfPeriod(self, begin, end, now, half, strength)
+        self._swings.append(half_period)
+        return half_period
 
     def outlasts_earlier_swings(self, now: float, least_strength: float) -> bool:
         """Return True if the oscillation is much longer than all earlier ones and is neither rest nor rotation.
@@ -189,7 +196,8 @@ class InnerMotion:
     def __init__(self, of_deck: Wait | None = None, before: float = 0.0) -> None:
         time_of_deck = of_deck.time if of_deck else 0.0
         self._half_of_springs = time_of_deck or np.inf
-        self._least, self._least_time = of_deck, max(before, time_of_deck)
+        self._least = of_deck
+        self._least_time = max(before, time_of_deck)
         if before > time_of_deck:
             self._least = Wait(before, "record", "as in the flight before")
         self._energy = _Motion("the internal energy", halves_per_swing=2.0)
@@ -261,8 +269,10 @@ class InnerMotion:
             strongest = max(so_far[-1].strength, swing.strength)
             longest = so_far[-1]._replace(since=swing.seen_at, strength=strongest)
             so_far.append(longest)
-            is_too_long = is_free and swing.half > _LONGEST_FREE * self._half_of_springs
-            if swing.strength < _ROTATION * strongest or is_too_long:
+            longest_free_half = _LONGEST_FREE * self._half_of_springs
+            is_too_long = is_free and swing.half > longest_free_half
+            is_rotation = swing.strength < _ROTATION * strongest
+            if is_rotation or is_too_long:
                 continue
             half = min(swing.half, _LONGEST_PUSHED * self._half_of_springs)
             longest = longest._replace(swing=max(longest.swing, half))
@@ -285,9 +295,12 @@ class InnerMotion:
 
     def _get_longest(self, now: float) -> _Longest:
         """Return the longest half period up to a time, from part motions or, before any part moves, from the energy."""
-        has_parts = self._parts_since <= now
-        so_far = self._longest_of_parts if has_parts else self._longest_of_energy
-        return so_far[bisect_right(so_far, now, key=lambda longest: longest.since) - 1]
+        if self._parts_since <= now:
+            so_far = self._longest_of_parts
+        else:
+            so_far = self._longest_of_energy
+        count = bisect_right(so_far, now, key=lambda longest: longest.since)
+        return so_far[count - 1]
 
     def is_unfinished(self, now: float) -> bool:
         """Return True if an unfinished oscillation is much longer than all earlier ones and there is no deck."""

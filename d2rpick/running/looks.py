@@ -42,7 +42,8 @@ class Looks:
         inventory: Inventory | None = None,
         wait: float | None = None,
     ) -> None:
-        self._selection, self._inventory = selection, inventory
+        self._selection = selection
+        self._inventory = inventory
         self._waits = (wait, wait_of_deck(inventory) if inventory else None)
         self.evidence = GrowingEvidence(*self._waits)
         self.record = GrowingRecord()

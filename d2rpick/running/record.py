@@ -39,7 +39,8 @@ class GrowingColumn:
 
     def add(self, rows: NDArray[Any]) -> NDArray[Any]:
         """Append ``rows`` of shape (k, ...), and return all rows so far as a view."""
-        first, size = len(self.rows), len(self.rows) + len(rows)
+        first = len(self.rows)
+        size = first + len(rows)
         shape = rows.shape[1:]
         if size > len(self._room):
             self._room = np.empty((2 * size, *shape), rows.dtype)
@@ -57,10 +58,14 @@ class RunningMaximum:
 
     def add(self, values: NDArray[Any]) -> NDArray[Any]:
         """Append values (k, ...), and return the largest value so far at each of them."""
-        before = values[:0] if self._last is None else self._last
-        maxima = np.maximum.accumulate(np.concatenate([before, values]), axis=0)
-        self._last = maxima[-1:]
-        return maxima[len(before) :]
+        if self._last is None:
+            maxima = np.maximum.accumulate(values, axis=0)
+        else:
+            all_values = np.concatenate([self._last, values])
+            maxima = np.maximum.accumulate(all_values, axis=0)[1:]
+        if len(values):
+            self._last = maxima[-1:]
+        return maxima
 
 
 class GrowingRecord:
@@ -120,7 +125,8 @@ def _select_new_states(table: Table, known_table: Table | None) -> Table | None:
     if known_table is None or not known_table.time.size:
         return select_states(table, new_states)
     count = int(np.searchsorted(table.time, known_table.time[-1], side="right"))
-    columns, known_columns = list_columns(table), list_columns(known_table)
+    columns = list_columns(table)
+    known_columns = list_columns(known_table)
     if count == 0 or columns.keys() != known_columns.keys():
         return None
     for name, rows in columns.items():
@@ -140,8 +146,10 @@ def _select_new_states(table: Table, known_table: Table | None) -> Table | None:
 
 def _is_unsettled(table: Table) -> bool:
     """Return True if the last two times of a table are as close together as printed times can be."""
-    precision = (
-        table.precision if not isinstance(table, History) else table.time_precision
-    )
-    steps = np.diff(table.time[-2:])
-    return any(steps <= _APART * precision.quanta(table.time[-1:]))
+    if isinstance(table, History):
+        precision = table.time_precision
+    else:
+        precision = table.precision
+    last_step = np.diff(table.time[-2:])
+    last_digit = precision.quanta(table.time[-1:])
+    return any(last_step <= _APART * last_digit)

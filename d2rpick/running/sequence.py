@@ -246,7 +246,7 @@ def _order_probe(legs: Sequence[Leg], limits: Limits) -> Order:
     if last.rigid:
         flown = last.until - collect_joined_legs(last, legs)[0].start
     elif not findings.idle and findings.tr <= last.start:
-        # The energy was higher at the start of the engine run, so the probe begins there and replaces the engine run.
+        # The energy was higher at the start of the last engine run than at its end, so the probe starts there.
         last = last.undone()
     length = max(
         findings.wait or 0.0,

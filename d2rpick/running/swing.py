@@ -52,16 +52,22 @@ def find_swing(history: History, start: float, tr: float) -> Swing | None:
     if momenta is None or momenta.parts is None:
         return None
     moving_parts = tuple(momenta.parts[number] for number in momenta.moving)
-    drift = find_drift_in_flight(history, Flight(start, tr, "momentum", moving_parts))
+    flight = Flight(start, tr, "momentum", moving_parts)
+    drift = find_drift_in_flight(history, flight)
     if drift is None:
-        measured = _measure_pair(momenta, start, tr)
+        swing_of_pair = _measure_pair(momenta, start, tr)
+        if swing_of_pair is None:
+            return None
+        name, error, path = swing_of_pair
     else:
+        name = drift.part.name
         error = float(np.max(drift.errors(drift.time, float(drift.time[-1]))))
-        measured = drift.part.name, error, float(drift.path[-1])
-    if measured is None or measured[2] <= 0:
+        path = float(drift.path[-1])
+    if path <= 0:
         return None
-    name, error, path = measured
-    return Swing(name, error, error / path / MOST_OF_PATH * (tr - start), drift is None)
+    # The path grows in proportion to the length of the flight.
+    shortest_flight = error / path / MOST_OF_PATH * (tr - start)
+    return Swing(name, error, shortest_flight, drift is None)
 
 
 def _measure_pair(
@@ -72,7 +78,8 @@ def _measure_pair(
     The upper bound is that of the displacement of the heavier part; the path is that of both parts [length].
     """
     inside = find_window(momenta.time, start, tr)
-    time, masses = momenta.time[inside], momenta.masses
+    time = momenta.time[inside]
+    masses = momenta.masses
     if momenta.parts is None or masses is None or time.size < 2:
         return None
     pair = [
@@ -82,9 +89,11 @@ def _measure_pair(
     ]
     if len(pair) != 2:
         return None
-    light, heavy = np.argsort(masses[pair]).tolist()
-    velocity = momenta.values[inside][:, pair] / masses[pair, np.newaxis]
-    displacements, path = integrate_displacements(time, velocity, masses[pair])
-    of_heavy = displacements[:, heavy]
-    error = float(np.linalg.norm(of_heavy - of_heavy[-1], axis=1).max())
-    return momenta.parts[pair[light]].name, error, float(path[-1])
+    masses_of_pair = masses[pair]
+    light, heavy = np.argsort(masses_of_pair).tolist()
+    velocity = momenta.values[inside][:, pair] / masses_of_pair[:, np.newaxis]
+    displacements, path = integrate_displacements(time, velocity, masses_of_pair)
+    displacement = displacements[:, heavy]
+    distances = np.linalg.norm(displacement - displacement[-1], axis=1)
+    name = momenta.parts[pair[light]].name
+    return name, float(distances.max()), float(path[-1])

@@ -137,12 +137,14 @@ class Watch:
         evidence = self.looks.evidence
         if not evidence.witnesses:
             raise RangeError(f"{', '.join(names)}: {_NO_EVIDENCE}")
-        events_before, self._events = self._events, find_events(evidence)
+        events_before = self._events
+        self._events = find_events(evidence)
         pairs = zip(events_before, self._events, strict=False)
         # Other values of an event may change in their last digits if all states are read again.
         are_kept = [before[:3] == event[:3] for before, event in pairs]
         kept_count = [*are_kept, False].index(False)
-        now, flights = evidence.history.end, evidence.flights()
+        now = evidence.history.end
+        flights = evidence.flights()
         wait = evidence.given or evidence.motion.longest(now)
         return news._replace(
             start=evidence.history.start,

@@ -110,7 +110,8 @@ class GrowingWitness:
     def __init__(
         self, members: tuple[int, ...], parts: tuple[Part, ...] | None
     ) -> None:
-        self.members, self.parts = members, parts
+        self.members = members
+        self.parts = parts
         self.free: list[int] = []
         self.flights: list[SeenFlight] = []
         self.pauses: list[tuple[float, float]] = []
@@ -196,8 +197,9 @@ class GrowingWitness:
         """
         time = self.time
         for state in range(self._examined_count, len(self.free)):
-            first, now = self.free[state], float(time[state])
+            first = self.free[state]
             start = float(time[first])
+            now = float(time[state])
             flies = bool(self.flights) and self.flights[-1].end is None
             earlier_start = self.flights[-1].start if flies else self._start
             if state > 0 and now - start < (now - earlier_start) / 2:
@@ -250,10 +252,13 @@ class GrowingWitness:
 
     def _find_level(self, first: int, last: int) -> float | None:
         """Return when the centre of mass is again as high as at ``first`` [time]; None if that is before ``last``."""
-        begin, end = self._columns.rows[[first, last]]
-        gained = end[2:] - begin[2:]
-        start, now = begin[0], end[0]
-        time_to_level = -2 * (now - start) * (begin[2:] @ gained) / (gained @ gained)
+        rows = self._columns.rows
+        start = rows[first, 0]
+        now = rows[last, 0]
+        momentum = rows[first, 2:]
+        gained = rows[last, 2:] - momentum
+        # For the momentum p and the weight G, the height is p t + G t^2/2 along G, which is 0 at t = -2 (p G)/(G G).
+        time_to_level = -2 * (now - start) * (momentum @ gained) / (gained @ gained)
         level = float(start + time_to_level)
         return level if level > now else None
 
@@ -265,8 +270,10 @@ def _set_tolerance(
 
     ``values`` (n,) are the values of the sum.
     """
-    largest = np.maximum.accumulate(np.abs(values))
-    noise = count * precision.quanta(largest) / 2
-    tolerance = np.maximum(CONSTANT * largest + noise, np.finfo(float).tiny)
-    shows_forces = (noise <= TOLERANCE * largest) & (largest > 0)
-    return tolerance, shows_forces
+    largest_so_far = np.maximum.accumulate(np.abs(values))
+    # Each of the values is rounded by up to half a unit of its last digit.
+    rounding = count * precision.quanta(largest_so_far) / 2
+    tolerance = CONSTANT * largest_so_far + rounding
+    tolerance = np.maximum(tolerance, np.finfo(float).tiny)
+    is_precise = rounding <= TOLERANCE * largest_so_far
+    return tolerance, is_precise & (largest_so_far > 0)

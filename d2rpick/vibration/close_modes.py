@@ -81,7 +81,7 @@ def _is_static_like_beat(grid: Grid, spectrum: Spectrum) -> bool:
 
 
 def _compute_ends(grid: Grid, spectrum: Spectrum) -> tuple[Samples, Samples]:
-    """Return the sum of the lines' heights and the static energy at both ends of the grid, each (2,) [energy]."""
+    """Return the sum of the line heights and the static energy, each (2,), at the first and last time [energy]."""
     ends = grid.time[[0, -1]]
     heights = _sum_heights(spectrum.lines).at(ends)
     return heights, spectrum.mean.at(ends) - heights
@@ -125,7 +125,7 @@ def _divide_lines(grid: Grid, spectrum: Spectrum) -> Iterator[Exponentials]:
 
 
 def _fit_lines(grid: Grid, lines: Exponentials) -> Spectrum:
-    """Fit lines whose heights add up to the mean energy by the method of Levenberg and Marquardt."""
+    """Use the Levenberg-Marquardt algorithm to fit lines whose heights add up to the mean energy."""
     spectrum = _fill_mean(grid, lines)
     damping = _DAMPING
     for _ in range(_MOST_STEPS):

@@ -64,7 +64,7 @@ class Doubts(NamedTuple):
 
     @property
     def refusal_at_all(self) -> str | None:
-        """Return the reason why the record is refused even if no better model exists; None if it is then accepted."""
+        """Return why the record is refused even if there is no better model; None if it is accepted in that case."""
         return self._first_of(_MOST_NEGATIVE_AT_ALL, _MOST_UNSTRETCHED_AT_ALL)
 
     def _first_of(self, most_negative: float, most_unstretched: float) -> str | None:

@@ -27,7 +27,7 @@ _LOOSE_TURNS: Final = 0.5
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LineScatter:
-    """Standard deviation of the squared residual for one interpretation ``reading`` of the lines on a ``grid``.
+    """Standard deviation of the squared residual if the lines on a ``grid`` are assigned to modes as in ``reading``.
 
     ``systematic`` is the fraction of the misfit that neighbouring states have in common [-].
     """
@@ -49,12 +49,8 @@ class LineScatter:
     def _spread(self) -> Samples:
         """Return a square root of the parameters' covariance matrix, shape (p, p)."""
         spectrum = self.reading.spectrum
-        averaged = spectrum.average_blocks(self.grid)
-        times = self.grid.time
-        design = np.hstack(
-            [averaged.lines.differentiate(times), averaged.mean.waves(times).real]
-        )
-        freedom = max(times.size - design.shape[1], 1)
+        design = spectrum.differentiate_means(self.grid)
+        freedom = max(self.grid.time.size - design.shape[1], 1)
         shared = min(self.systematic, MOST_SHARED)
         # The number of independent states follows from a first-order autoregressive model.
         variance = np.sum(spectrum.rest**2) / freedom * (1 + shared) / (1 - shared)

@@ -16,6 +16,7 @@ import numpy as np
 
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.histories.samples import compute_median
+from d2rpick.vibration.least_squares import solve_least_squares
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -29,7 +30,7 @@ _ORDERS: Final = (3, 5, 7, 9, 11, 13, 17, 21, 27, 35, 45, 57, 71)
 # _CLEARLY_BETTER: more exponentials are preferred if they reduce the prediction error to this fraction or less [-].
 # PERFECT: relative prediction error below which no more exponentials are tried [-].
 _CLEARLY_BETTER, PERFECT = 0.8, 2e-4
-# _BETTER: fraction that replaces _CLEARLY_BETTER if the misfit still contains a spectral line [-].
+# _BETTER: replaces _CLEARLY_BETTER if the misfit with fewer exponentials still contains a spectral line [-].
 # _OF_A_LINE: a misfit contains a spectral line if its largest power is at least this multiple of the mean power [-].
 _BETTER, _OF_A_LINE = 0.97, 16.0
 # Fraction of the record that is fitted to predict the rest of the record [-].
@@ -40,6 +41,10 @@ _MOST_LAGS: Final = 340
 # _FEWEST_STATES: smallest number of states in the uniform grid.
 # _MOST_STATES: largest number of states in the uniform grid.
 _STATES_PER_PERIOD, _FEWEST_STATES, _MOST_STATES = 4.0, 64, 2000
+# The means over at least _FEW_BLOCKS blocks show whether an energy is unpredictable.
+# _MANY_BLOCKS: smallest number of blocks that are tested in this way, as a multiple of _FEW_BLOCKS [-].
+# _MOST_SWING: smallest fraction of the energy's oscillation that these means must show [-].
+_FEW_BLOCKS, _MANY_BLOCKS, _MOST_SWING = 140, 4, 0.5
 # Times are treated as evenly spaced if they deviate by at most this fraction of an interval [-].
 _EVEN: Final = 1e-3
 # A line exceeds white noise if its power is at least this multiple of the median power [-].
@@ -59,6 +64,8 @@ MOST_GROWTH: Final = 0.2
 # _MOST_DECAYS: largest number of decaying exponentials that the mean contains in addition to a constant.
 # _SAME_DECAY: two exponentials are distinguished if their decays over the record differ by at least this exponent [-].
 _MOST_DECAYS, _SAME_DECAY = 4, 0.05
+# Smallest divisor of numbers of order one [-].
+_TINY: Final = 1e-12
 
 
 class Grid(NamedTuple):
@@ -84,9 +91,23 @@ class Grid(NamedTuple):
         """Return the time from the first block to the last block [time]."""
         return float(self.time[-1] - self.time[0])
 
+    @property
+    def first_part(self) -> Grid:
+        """Return the first part of the grid, which is fitted to predict the rest."""
+        return self.some(slice(int(FIRST_PART * self.time.size)))
+
     def some(self, blocks: slice) -> Grid:
         """Return a grid with some successive blocks."""
         return self._replace(time=self.time[blocks], energy=self.energy[blocks])
+
+    def coarsen(self, factor: int) -> Grid:
+        """Return the means over blocks that are ``factor`` times as long; the last blocks may be left out."""
+        count = self.time.size // factor
+        time, energy = (
+            column[: count * factor].reshape(count, factor).mean(axis=1)
+            for column in (self.time, self.energy)
+        )
+        return self._replace(time=time, energy=energy, size=factor * self.size)
 
     def waves(self, poles: Complex) -> Complex:
         """Return exp(p (t - t_0)) at the m times t of the grid, where t_0 is the first time; shape (m, poles) [-].
@@ -97,10 +118,11 @@ class Grid(NamedTuple):
         width = ceil(sqrt(count))
         inner = np.arange(width) * self.step
         outer = np.arange(0, count, width) * self.step
-        coarse: Complex = np.exp(np.multiply.outer(outer, poles))
-        fine: Complex = np.exp(np.multiply.outer(inner, poles))
-        products: Complex = coarse[:, np.newaxis] * fine
-        return products.reshape(-1, poles.size)[:count]
+        coarse: Complex = np.exp(np.multiply.outer(poles, outer))
+        fine: Complex = np.exp(np.multiply.outer(poles, inner))
+        # The times of a wave are adjacent in memory, because long inner loops are faster.
+        products: Complex = coarse[:, :, np.newaxis] * fine[:, np.newaxis]
+        return products.reshape(poles.size, -1)[:, :count].T
 
     def gain(self, poles: Complex) -> Complex:
         """Return the mean of ``exp(p t)`` over a block relative to its middle value, in the shape of ``poles`` [-]."""
@@ -134,17 +156,14 @@ def make_even_grid(time: Samples, energy: Samples) -> Grid:
     wanted = np.clip(_STATES_PER_PERIOD * fastest, _FEWEST_STATES, _MOST_STATES)
     size = max(1, int(time.size // wanted))
     count = time.size // size
-    middles, means = (
-        column[: count * size].reshape(count, size).mean(axis=1)
-        for column in (even, values)
-    )
-    return Grid(
-        middles,
-        means,
+    states = Grid(
+        even,
+        values,
         spacing=float(even[1] - even[0]),
-        size=size,
+        size=1,
         strong=count / max(strongest, 1),
     )
+    return states.coarsen(size)
 
 
 def _count_turns(time: Samples, values: Samples) -> tuple[float, float]:
@@ -189,13 +208,18 @@ class Exponentials(NamedTuple):
 
         The parameters are the real parts of all weights, their imaginary parts, then the same for the poles.
         """
-        courses = self.waves(times)
-        moved = courses * self.weights * (times - self.origin)[:, np.newaxis]
-        return np.hstack([courses.real, -courses.imag, moved.real, -moved.imag])
+        since_origin = times - self.origin
+        return _differentiate(self.waves(times), self.weights, since_origin)
 
     def some(self, which: NDArray[np.bool_]) -> Exponentials:
         """Return the waves selected by a mask."""
         return Exponentials(self.poles[which], self.weights[which], self.origin)
+
+
+def _differentiate(waves: Complex, weights: Complex, since_origin: Samples) -> Samples:
+    """Return the derivatives of a sum of ``waves`` (n, k), as `Exponentials.differentiate` does, shape (n, 4 k)."""
+    moved = waves * weights * since_origin[:, np.newaxis]
+    return np.hstack([waves.real, -waves.imag, moved.real, -moved.imag])
 
 
 class Spectrum(NamedTuple):
@@ -241,6 +265,17 @@ class Spectrum(NamedTuple):
         )
         return self._replace(lines=lines, mean=mean)
 
+    def differentiate_means(self, grid: Grid) -> Samples:
+        """Return the derivatives of the means over the m blocks of a grid that begins at the origin, (m, 4 k + mean).
+
+        The parameters are those of `Exponentials.differentiate` for the k lines, then the weights of the mean.
+        """
+        averaged = self.average_blocks(grid)
+        lines = averaged.lines
+        since_origin = grid.time - grid.time[0]
+        of_lines = _differentiate(grid.waves(lines.poles), lines.weights, since_origin)
+        return np.hstack([of_lines, grid.waves(self.mean.poles).real])
+
     def at(self, t: Samples | float) -> Samples:
         """Return the energy at each time, with the shape of ``t`` [energy]."""
         return self.lines.at(t) + self.mean.at(t)
@@ -271,21 +306,64 @@ class Prediction(NamedTuple):
         )
 
 
+class _Trial(NamedTuple):
+    """A number of exponentials (``order``) with the error of its prediction, and its spectrum of the first part."""
+
+    missed: float
+    order: int
+    every_decay: bool
+    of_first: Spectrum
+
+
 def predict(grid: Grid) -> Prediction | None:
     """Find the spectral lines that best predict the energy; None if the record is too short or does not oscillate."""
+    swing = _measure_swing(grid)
+    best = _find_best_order(grid, swing)
+    if best is None:
+        return None
+    poles = _SignalSpace.of(grid).poles(best.order)
+    whole = fit_spectrum(grid, poles, grid.span, every_decay=best.every_decay)
+    return Prediction(whole, best.of_first, best.missed, swing)
+
+
+def is_unpredictable(grid: Grid, most_missed: float) -> bool:
+    """Return True if means over few long blocks already show that lines predict the energy badly.
+
+    A mean of a sum of lines is again a sum of lines with the same decay rates, so what predicts an energy predicts its
+    means. This test takes a tenth of the time of a prediction. It is not made if there are not many more blocks, or if
+    the means hide most of the energy's oscillation.
+
+    Parameters
+    ----------
+    grid : Grid
+    most_missed : float
+        Largest prediction error that is not bad [-].
+    """
+    if grid.time.size < _MANY_BLOCKS * _FEW_BLOCKS:
+        return False
+    coarse = grid.coarsen(grid.time.size // _FEW_BLOCKS)
+    swing = _measure_swing(coarse)
+    if swing < _MOST_SWING * _measure_swing(grid):
+        return False
+    best = _find_best_order(coarse, swing)
+    return best is not None and best.missed > most_missed
+
+
+def _measure_swing(grid: Grid) -> float:
+    """Return the standard deviation of the energy about its trend [energy]."""
     reach = grid.time - grid.time[0]
-    if grid.time.size < _FEWEST_STATES // 2:
+    trend = np.polyval(np.polyfit(reach, grid.energy, 2), reach)
+    return float(np.std(grid.energy - trend))
+
+
+def _find_best_order(grid: Grid, swing: float) -> _Trial | None:
+    """Find the number of exponentials with which the first part of a grid predicts the rest best; None as `predict`."""
+    if grid.time.size < _FEWEST_STATES // 2 or not swing > 0:
         return None
-    swing = float(
-        np.std(grid.energy - np.polyval(np.polyfit(reach, grid.energy, 2), reach))
-    )
-    if not swing > 0:
-        return None
-    size_of_first = int(FIRST_PART * grid.time.size)
-    first = grid.some(slice(size_of_first))
-    rest = grid.some(slice(size_of_first, None))
+    first = grid.first_part
+    rest = grid.some(slice(first.time.size, None))
     space = _SignalSpace.of(first)
-    tried: list[tuple[float, int, bool, Spectrum]] = []
+    tried: list[_Trial] = []
     for order in _ORDERS:
         if order > first.time.size // 3 or order + 2 > space.size:
             break
@@ -295,16 +373,11 @@ def predict(grid: Grid) -> Prediction | None:
             predicted = _average_blocks(spectrum, rest)
             error = float(np.sqrt(np.mean((predicted - rest.energy) ** 2)))
             missed = float(np.hypot(error, spectrum.error)) / swing
-            if not tried or missed < _get_needed(tried[-1][3]) * tried[-1][0]:
-                tried.append((missed, order, every_decay, spectrum))
-        if tried[-1][0] < PERFECT:
+            if not tried or missed < _get_needed(tried[-1].of_first) * tried[-1].missed:
+                tried.append(_Trial(missed, order, every_decay, spectrum))
+        if tried[-1].missed < PERFECT:
             break
-    if not tried:
-        return None
-    missed, order, every_decay, of_first = tried[-1]
-    poles = _SignalSpace.of(grid).poles(order)
-    whole = fit_spectrum(grid, poles, grid.span, every_decay=every_decay)
-    return Prediction(whole, of_first, missed, swing)
+    return tried[-1] if tried else None
 
 
 def _get_needed(spectrum: Spectrum) -> float:
@@ -315,10 +388,17 @@ def _get_needed(spectrum: Spectrum) -> float:
 
 
 class _SignalSpace:
-    """The signal subspace spanned by the windows of a record; its directions are in descending order of size."""
+    """The signal subspace spanned by the windows of a record; its directions are in descending order of size.
+
+    Two products of the directions suffice to find poles: of all values but the last with all values but the first, and
+    of the ``last_values`` with themselves, because the directions are orthonormal.
+    """
 
     def __init__(self, vectors: Samples, step: float) -> None:
-        self.vectors, self.step = vectors, step
+        self.size, self.step = int(vectors.shape[1]), step
+        leading = vectors[:, : max(_ORDERS)]
+        self._shifted = leading[:-1].T @ leading[1:]
+        self._last_values = leading[-1]
 
     @classmethod
     def of(cls, grid: Grid) -> _SignalSpace:
@@ -327,15 +407,13 @@ class _SignalSpace:
         windows = np.lib.stride_tricks.sliding_window_view(grid.energy, lags)
         return cls(np.linalg.eigh(windows.T @ windows)[1][:, ::-1], grid.step)
 
-    @property
-    def size(self) -> int:
-        """Return the number of dimensions of the subspace."""
-        return int(self.vectors.shape[1])
-
     def poles(self, order: int) -> Complex:
         """Return the poles of ``order`` exponentials [1/time], from the shift invariance of the subspace (ESPRIT)."""
-        leading = self.vectors[:, :order]
-        shift = np.linalg.lstsq(leading[:-1], leading[1:], rcond=None)[0]
+        shifted = self._shifted[:order, :order]
+        last = self._last_values[:order]
+        # The least-squares solution for orthonormal directions without their last values (Sherman and Morrison).
+        without_last = max(1 - float(last @ last), _TINY)
+        shift = shifted + np.outer(last, last @ shifted) / without_last
         factors = np.linalg.eigvals(shift)
         is_usable = np.isfinite(factors) & (np.abs(factors) > 1e-6)
         usable_factors = factors[is_usable].astype(np.complex128)
@@ -361,7 +439,7 @@ def fit_weights(grid: Grid, lines: Complex, mean: Complex) -> Spectrum:
     waves = grid.waves(all_poles) * grid.gain(all_poles)
     swinging = all_poles.imag > 0
     design = np.hstack([waves.real, -waves.imag[:, swinging]])
-    solution = np.linalg.lstsq(design, grid.energy, rcond=1e-9)[0]
+    solution = solve_least_squares(design, grid.energy)
     weights = solution[: all_poles.size].astype(np.complex128)
     weights[swinging] += 1j * solution[all_poles.size :]
     origin = float(grid.time[0])

@@ -229,7 +229,10 @@ def _measure_locked_to(
     span: float,
     scatter: float,
 ) -> float:
-    """Return the relative height of the harmonics of a line beyond the second, up to the first unlocked one [-]."""
+    """Return the relative height of the third and higher harmonics that are phase-locked to a line [-].
+
+    The first harmonic that is missing or not phase-locked to the line ends the series.
+    """
     total = 0.0
     for times in _HARMONICS:
         harmonic_rate = times * rate[first]

@@ -339,7 +339,10 @@ class Profile(NamedTuple):
         return cls(time_before, lock_in_error(vibration, time_before, td))
 
     def minima(self) -> tuple[float, ...]:
-        """Return the times of the local minima [time], from parabolas through L^2, which is smooth."""
+        """Return the times of the local minima of the error L [time], found by fitting parabolas to L^2.
+
+        L^2 is smooth at a minimum, whereas L may have a kink there.
+        """
         t = self.time
         square = self.error**2
         if t.size < 3:

@@ -60,7 +60,7 @@ if TYPE_CHECKING:
     Mask = NDArray[np.bool_]
 
 # Smallest number of states in which spectral lines are identified.
-_FEWEST_STATES: Final = 32
+FEWEST_STATES: Final = 32
 # A static energy up to this fraction of the mean vibration energy may be a fitting error [-].
 _NO_STATIC: Final = 0.12
 # Smallest divisor of energies, as a fraction of the energy range of the record [-].
@@ -144,6 +144,8 @@ class ModalVibration:
         Number of states per period of the highest-frequency line that exceeds the noise [-].
     scatter : LineScatter
         Standard deviation of the squared residual due to the scatter of the record about its lines.
+    scatter_of_first_part : LineScatter
+        The same for the lines in the first part of the record.
     with_close_modes : Reading or None
         Interpretation in which two close modes replace one line, and no energy is static; None if not possible.
     swinging : float
@@ -168,6 +170,7 @@ class ModalVibration:
     systematic: float
     states_per_period: float
     scatter: LineScatter
+    scatter_of_first_part: LineScatter
     with_close_modes: Reading | None = None
     swinging: float = 0.0
     bent: float = 0.0
@@ -240,15 +243,15 @@ class ModalVibration:
         )
 
     def elastic_energy(self, t: Samples | float) -> Samples:
-        """Return V, at least 0, in the shape of ``t`` [energy]."""
+        """Return the elastic energy V of the vibration, at least 0, in the shape of ``t`` [energy]."""
         return np.maximum(self.reading.elastic_energy(t), 0.0)
 
     def vibration_energy(self, t: Samples | float) -> Samples:
-        """Return U = V + T, in the shape of ``t`` [energy]."""
+        """Return the vibration energy U = V + T (elastic plus kinetic), in the shape of ``t`` [energy]."""
         return self.reading.vibration_energy(t)
 
     def kinetic_energy(self, t: Samples | float) -> Samples:
-        """Return T, at least 0, in the shape of ``t`` [energy]."""
+        """Return the kinetic energy T of the vibration, at least 0, in the shape of ``t`` [energy]."""
         return np.maximum(self.vibration_energy(t) - self.elastic_energy(t), 0.0)
 
     def overlap(self, tr: Samples | float, td: Samples | float) -> Samples:
@@ -283,7 +286,10 @@ class ModalVibration:
 
     @cached_property
     def _at_all_times(self) -> tuple[Samples, _Course, Complex]:
-        """Return elastic energies at ``time`` and at finer times, and the part of the coherence that depends on tr."""
+        """Return V at ``time`` and on a finer time grid, and the factor of tr in the coherence C, for `profile`.
+
+        C is the coherence of the lines between tr and td, the product of a factor of tr and a factor of td.
+        """
         finer = np.linspace(
             self.time[0], self.time[-1], _FINER * (self.time.size - 1) + 1
         )
@@ -309,14 +315,11 @@ class ModalVibration:
         """
         reading, level = self.reading, self.reading.level(td)
         squared = reading.residual_squared(tr, td)
-        lines = (
-            np.abs(reading.coherence(tr, td) - self.of_first_part.coherence(tr, td))
-            / level
-        )
         deviation = measures.BAND_DEVIATIONS * self.scatter.compute_deviation(tr, td)
         # The accuracy of the lines follows from the fit and from a second fit to the first part of the record.
         of_lines = np.minimum(
-            np.maximum(deviation, lines), np.maximum(squared, _MOST_OPPOSED)
+            np.maximum(deviation, self._compare_with_first_part(tr, td)),
+            np.maximum(squared, _MOST_OPPOSED),
         )
         of_rest = _REST_COUNTS * self.noise / level * np.sqrt(self._structure_of_rest)
         of_structure = _compute_effect_of_deformation(_NOT_LINEAR, squared)
@@ -341,6 +344,21 @@ class ModalVibration:
             below + np.maximum(-shift - room, 0.0),
             above + np.maximum(shift - room, 0.0),
         )
+
+    def _compare_with_first_part(
+        self, tr: Samples | float, td: Samples | float
+    ) -> Samples:
+        """Return the change of the squared residual by the lines of the first part that noise does not explain [-]."""
+        change = (
+            self.reading.coherence(tr, td) - self.of_first_part.coherence(tr, td)
+        ) / self.reading.level(td)
+        if self._structure_of_rest > 0:
+            return np.abs(change)
+        explained = (
+            measures.BAND_DEVIATIONS
+            * self.scatter_of_first_part.compute_deviation(tr, td)
+        )
+        return np.maximum(np.abs(change) - explained, 0.0)
 
     @property
     def _structure_of_rest(self) -> float:
@@ -477,11 +495,22 @@ def identify_modal(
     >>> bool(abs(float(found.separation(1.0, 4.0)) - np.dot([1.0, 0.5, 0.3], np.square(apart))) < 1e-6)
     True
     """
-    if time.size < _FEWEST_STATES:
+    if time.size < FEWEST_STATES:
         return None
-    grid = make_even_grid(time, energy)
+    window = float(time[0]), float(time[-1])
+    return identify_in_grid(make_even_grid(time, energy), window, kinetic=kinetic)
+
+
+def identify_in_grid(
+    grid: Grid, window: tuple[float, float], *, kinetic: bool = False
+) -> ModalVibration | None:
+    """Identify the modes from the energy on an even ``grid``, as `identify_modal` does.
+
+    ``window`` contains the times of the first and last states [time]; the grid of block means is shorter.
+    """
     prediction = predict(grid)
-    if prediction is None or prediction.swing <= RESOLVED * float(np.abs(energy).max()):
+    highest = float(np.abs(grid.energy).max())
+    if prediction is None or prediction.swing <= RESOLVED * highest:
         return None
     # If the prediction error is larger, the record is refused, whatever its lines.
     if prediction.missed <= MOST_MISSED:
@@ -493,7 +522,6 @@ def identify_modal(
         prediction = prediction.count_slow_as_mean(grid.span)
     if not prediction.spectrum.lines.poles.size:
         return None
-    window = float(time[0]), float(time[-1])
     if kinetic:
         return _read(grid, prediction.turned(), window, kinetic=True)
     return _read(grid, prediction, window)
@@ -620,11 +648,12 @@ def _read(
         doubts = doubts._replace(drift=0.0)
     if kinetic:
         doubts = doubts._replace(negative=0.0, drift=0.0, unstretched=0.0)
+    of_first_part = _read_first_part(reading, prediction, grid, stretches, scatter)
     return ModalVibration(
         time=_close_times(reading, window, grid.time.size),
         reading=reading,
         others=interpretation.others,
-        of_first_part=_read_first_part(reading, prediction, grid, stretches, scatter),
+        of_first_part=of_first_part,
         with_close_modes=None
         if close_modes is None
         else _read_close_modes(reading, close_modes),
@@ -635,6 +664,7 @@ def _read(
             grid.strong, _count_states(spectrum.lines, grid, scatter)
         ),
         scatter=LineScatter(reading, grid, systematic),
+        scatter_of_first_part=LineScatter(of_first_part, grid.first_part, systematic),
         swinging=sum(stretch.energy for stretch in stretches if stretch.swings),
         bent=max((third.second for third in springs), default=0.0),
         source="kinetic energy" if kinetic else "internal energy",

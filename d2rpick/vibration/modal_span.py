@@ -9,11 +9,14 @@ import numpy as np
 from d2rpick.base.memory import remember
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.histories.samples import compute_median, get_ends
-from d2rpick.vibration.modal import ModalVibration, identify_modal
+from d2rpick.vibration.doubts import MOST_MISSED
+from d2rpick.vibration.lines import is_unpredictable, make_even_grid
+from d2rpick.vibration.modal import FEWEST_STATES, ModalVibration, identify_in_grid
 from d2rpick.vibration.span import ERRORS_OFF, MOST_REFITS, Span
 
 if TYPE_CHECKING:
     from d2rpick.histories.history import History, Samples
+    from d2rpick.vibration.lines import Grid
 
 # Number of equal parts of the record; windows end at the boundaries of the parts.
 _PARTS: Final = 16
@@ -74,6 +77,12 @@ def _grow_described(history: History, window: Span) -> ModalWindow | None:
 
     The result depends only on the window, not on the td for which the window was first needed.
     """
+    time, _ = history.between(*window)
+    if time.size < FEWEST_STATES:
+        return None
+    # Most windows of a record without a flight are refused by this test, which is much faster than the identification.
+    if is_unpredictable(_make_grid(history, *get_ends(time)), MOST_MISSED):
+        return None
     vibration = identify_window(history, window)
     if vibration is None or not vibration.convinces:
         return None
@@ -109,7 +118,9 @@ def _list_windows(history: History, td: float, guess: Span | None) -> list[Span]
 def identify_window(history: History, window: Span) -> ModalVibration | None:
     """Identify the modes in a window; the result is cached for all windows with the same states."""
     time, _ = history.between(*window)
-    return _identify_states(history, *get_ends(time)) if time.size else None
+    if time.size < FEWEST_STATES:
+        return None
+    return _identify_states(history, *get_ends(time))
 
 
 @remember
@@ -117,7 +128,13 @@ def _identify_states(
     history: History, first: float, last: float
 ) -> ModalVibration | None:
     """Identify the modes of the states between two times."""
-    return identify_modal(*history.between(first, last))
+    return identify_in_grid(_make_grid(history, first, last), (first, last))
+
+
+@remember
+def _make_grid(history: History, first: float, last: float) -> Grid:
+    """Resample the energies of the states between two times on an even grid."""
+    return make_even_grid(*history.between(first, last))
 
 
 def _grow_window(history: History, described: ModalWindow) -> ModalWindow:

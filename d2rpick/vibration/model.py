@@ -25,6 +25,7 @@ from d2rpick.vibration.identify import (
 )
 from d2rpick.vibration.modes import Mode
 from d2rpick.vibration.moments import (
+    ModalEnergy,
     Moments,
     OscillatorEnergy,
     SampledEnergy,
@@ -283,10 +284,11 @@ def find_moments(
     Parameters
     ----------
     vibrations : sequence of length n
+        Vibration around each td.
     tolerance : float
-        [-]
+        Largest level error of an extremum that is a candidate [-].
     since : sequence of length n
-        [time]
+        Earliest candidate time for each td [time].
     """
     moments: dict[int, Moments] = {}
     for positions in _group_alike(vibrations):
@@ -441,9 +443,14 @@ def model_at(whole: Vibration, evidence: Evidence) -> Vibration:
 def _compare_with_signs(whole: Vibration, basis: str, model: SignedModel) -> Vibration:
     """Return a copy of the vibration with signed deformations; the level at td remains that of the total energy."""
     first = model.comparable_since(whole.td)
+    energy = whole.whole
+    if basis == "modal":
+        window = (first, float(model.time[-1]))
+        energy = ModalEnergy(energy.history, whole.td, model.elastic_energy, window)
     return replace(
         whole,
         basis=basis,
+        whole=energy,
         compared=Compared(
             model, first, float(model.time[-1]), model.profile, model.residual_band
         ),

@@ -1,6 +1,7 @@
-"""Find candidate times for tr: times at which the total energy equals that at td, with their errors.
+"""Find candidate times for tr, with their errors.
 
-The energy around a td is known from its samples or from modes that describe the samples.
+At most of them the total energy equals that at td. Others are extrema of the energy near this level, and times at which
+the deformations match best. The energy around a td is known from its samples or from modes that describe the samples.
 """
 
 from __future__ import annotations
@@ -228,6 +229,52 @@ class OscillatorEnergy(SampledEnergy):
             inside(times[is_described]),
             outside(times[~is_described]),
         )
+        return energies
+
+
+class ModalEnergy(SampledEnergy):
+    """The samples of a record for one ``td``, interpolated with the help of the modes that describe a window.
+
+    ``elastic_energy`` returns the elastic energy of the modes at given times. ``window`` contains the first and the
+    last time that the modes describe [time].
+    """
+
+    def __init__(
+        self,
+        history: History,
+        td: float,
+        elastic_energy: Callable[[Samples], Samples],
+        window: tuple[float, float],
+    ) -> None:
+        super().__init__(history, td)
+        self.elastic_energy = elastic_energy
+        self.window = window
+
+    def energy(self, time: float) -> float:
+        """Return the energy at a time [energy]."""
+        return float(self.energies(np.array([time]))[0])
+
+    def energies(self, times: Samples) -> Samples:
+        """Return the energies at the given times (n,) [energy].
+
+        A straight line between two states of a coarse record misses the energy by much, because the energy of a
+        vibration is curved. The modes give the difference between the curve and the line.
+        """
+        energies = self.history.energies_at(times)
+        first, last = self.window
+        is_described = (times >= first) & (times <= last)
+        described = times[is_described]
+        states = self.history.time
+        after = np.clip(np.searchsorted(states, described), 1, states.size - 1)
+        start = states[after - 1]
+        step = states[after] - start
+        fraction = np.divide(
+            described - start, step, out=np.zeros(described.shape), where=step > 0
+        )
+        elastic_at_start = self.elastic_energy(start)
+        rise = self.elastic_energy(states[after]) - elastic_at_start
+        on_line = elastic_at_start + fraction * rise
+        energies[is_described] += self.elastic_energy(described) - on_line
         return energies
 
 

@@ -8,10 +8,12 @@ import numpy as np
 
 from d2rpick.base.caching import cached_property
 from d2rpick.vibration import measures
-from d2rpick.vibration.modes import Mode
+from d2rpick.vibration.modes import Mode, compute_deformations
 from d2rpick.vibration.span import SMALLEST
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
     from d2rpick.histories.history import Samples
     from d2rpick.vibration.identify import Identification
 
@@ -19,6 +21,8 @@ if TYPE_CHECKING:
 _HARMLESS: Final = 0.25**2
 # Effect of the harmonics of a nonlinear spring on the squared residual, per hidden fraction of the energy [-].
 _HARMONIC_COUNTS: Final = 8.0
+# Number of tr for which all moved modes are evaluated at once, so that the values fit into the processor cache.
+_TOGETHER: Final = 2048
 
 
 class OscillatorBand:
@@ -70,30 +74,32 @@ class OscillatorBand:
 
     def _compute_deviation(self, tr: Samples, td: Samples | float) -> Samples:
         """Return the standard deviation of the squared residual for each tr (n,), due to uncertain parameters [-]."""
+        above, below = self._moved_modes
+        if not above:
+            return np.zeros(tr.shape)
         is_usual = isinstance(td, float) and td == self._td
-        pairs = self._pairs_at_usual_td if is_usual else self._make_pairs(td)
-        deviation: Samples = np.zeros(tr.shape)
-        for above, below in pairs:
-            deviation = np.hypot(deviation, (above.compute(tr) - below.compute(tr)) / 2)
+        residuals = (
+            self._residuals_at_usual_td
+            if is_usual
+            else _SquaredResiduals([*above, *below], td)
+        )
+        deviation = np.empty(tr.shape)
+        for first in range(0, tr.size, _TOGETHER):
+            block = slice(first, first + _TOGETHER)
+            squared = residuals.compute(tr, block)
+            differences = (squared[: len(above)] - squared[len(above) :]) / 2
+            deviation[block] = np.hypot.reduce(differences, axis=0, initial=0.0)
         return deviation
 
     @cached_property
-    def _pairs_at_usual_td(self) -> list[tuple[_SquaredResidual, _SquaredResidual]]:
-        """The result of `_make_pairs` for the usual td, which many calls ask for."""
-        return self._make_pairs(self._td)
-
-    def _make_pairs(
-        self, td: Samples | float
-    ) -> list[tuple[_SquaredResidual, _SquaredResidual]]:
-        """Return the squared residuals of the moved modes at ``td``."""
-        return [
-            (_SquaredResidual(above, td), _SquaredResidual(below, td))
-            for above, below in self._moved_modes
-        ]
+    def _residuals_at_usual_td(self) -> _SquaredResiduals:
+        """The squared residuals of the moved modes at the usual td, which many calls ask for."""
+        above, below = self._moved_modes
+        return _SquaredResiduals([*above, *below], self._td)
 
     @cached_property
-    def _moved_modes(self) -> list[tuple[Mode, Mode]]:
-        """Pairs of modes whose parameters deviate by one standard deviation, in independent directions.
+    def _moved_modes(self) -> tuple[list[Mode], list[Mode]]:
+        """Modes with parameters above and below those of the fit, by one standard deviation in independent directions.
 
         The covariance is scaled to a unit diagonal first: its parameters have different units.
         """
@@ -106,26 +112,37 @@ class OscillatorBand:
             for value, direction in zip(values.tolist(), directions.T, strict=True)
             if value > 0
         ]
-        return [
-            (_move_parameters(self._mode, step), _move_parameters(self._mode, -step))
-            for step in steps
-        ]
+        return (
+            [_move_parameters(self._mode, step) for step in steps],
+            [_move_parameters(self._mode, -step) for step in steps],
+        )
 
 
-class _SquaredResidual:
-    """The squared residual R^2 of a mode at one td, or at a td for each tr; what depends on td is computed once."""
+class _SquaredResiduals:
+    """The squared residuals R^2 of modes at one td, or at a td for each tr; what depends on td is computed once."""
 
-    def __init__(self, mode: Mode, td: Samples | float) -> None:
-        self._mode = mode
-        self._amplitudes_at_td = mode.amplitudes(td)
-        self._kinetic_energy = mode.kinetic_energy(td)
-        self._energy = mode.vibration_energy(td)
+    def __init__(self, modes: Sequence[Mode], td: Samples | float) -> None:
+        def compute_row(energy: Callable[[Mode], Samples]) -> Samples:
+            """Return a value of each mode, shape (m, 1) for one td, else (m, n)."""
+            return np.reshape([energy(mode) for mode in modes], (len(modes), -1))
 
-    def compute(self, tr: Samples) -> Samples:
-        """Return R^2 of each tr (n,) [-]."""
-        differences = (self._mode.amplitudes(tr).T - self._amplitudes_at_td.T).T
-        lost = np.sum(differences**2, axis=0) + self._kinetic_energy
-        return np.asarray(lost / self._energy)
+        self._modes = modes
+        self._deformations_at_td = compute_row(lambda mode: mode.deformation(td))
+        self._kinetic_energies = compute_row(lambda mode: mode.kinetic_energy(td))
+        self._energies = compute_row(lambda mode: mode.vibration_energy(td))
+
+    def compute(self, tr: Samples, block: slice) -> Samples:
+        """Return R^2 of each mode for each tr (n,) in a block of k times, shape (m, k) [-]."""
+        at_td, kinetic, energy = (
+            np.broadcast_to(values, (len(self._modes), tr.size))[:, block]
+            for values in (
+                self._deformations_at_td,
+                self._kinetic_energies,
+                self._energies,
+            )
+        )
+        differences = compute_deformations(self._modes, tr[block]) - at_td
+        return np.asarray((differences**2 + kinetic) / energy)
 
 
 def _count_opposed(mode: Mode, tr: Samples, td: Samples | float) -> Samples:

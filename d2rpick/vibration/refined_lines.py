@@ -62,7 +62,8 @@ _OF_MEAN: Final = 1.0
 def refine_prediction(grid: Grid, prediction: Prediction) -> Prediction:
     """Return the prediction with refined lines of the whole record, if these lines leave only noise as the misfit.
 
-    The lines of the first part are not refined, because they only serve to test the others.
+    The same lines are then refined in the first part of the record, whose own search may have missed one of two lines
+    that only the whole record separates.  Lines that a linear structure does not have differ there.
     """
     spectrum = prediction.spectrum
     if spectrum.error <= PERFECT * prediction.swing or not spectrum.lines.poles.size:
@@ -82,8 +83,16 @@ def refine_prediction(grid: Grid, prediction: Prediction) -> Prediction:
     spectrum = _remove_needless_lines(grid, spectrum)
     # If the remaining misfit is not noise, the refined lines may be fitted to a load that is still ending.
     # The prediction then keeps its unrefined lines.
-    is_noise = measure_structure(spectrum.rest) == 0
-    return prediction._replace(spectrum=spectrum) if is_noise else prediction
+    if measure_structure(spectrum.rest) > 0:
+        return prediction
+    of_first_part = _refine_in_first_part(grid, spectrum)
+    return prediction._replace(spectrum=spectrum, of_first_part=of_first_part)
+
+
+def _refine_in_first_part(grid: Grid, spectrum: Spectrum) -> Spectrum:
+    """Return the lines of the record as the first part of the record alone shows them."""
+    poles = spectrum.lines.poles, spectrum.mean.poles
+    return _refine_spectrum(grid.first_part, fit_weights(grid.first_part, *poles))
 
 
 def _refine_spectrum(grid: Grid, spectrum: Spectrum) -> Spectrum:
@@ -105,13 +114,9 @@ def _refine_spectrum(grid: Grid, spectrum: Spectrum) -> Spectrum:
 
 def _compute_step_of_poles(grid: Grid, spectrum: Spectrum) -> Complex:
     """Return the change of the poles, shape (k,), that would remove the misfit if all parameters acted linearly."""
-    averaged = spectrum.average_blocks(grid)
-    times = grid.time
     count = spectrum.lines.poles.size
-    design = np.hstack(
-        [averaged.lines.differentiate(times), averaged.mean.waves(times).real]
-    )
-    if design.shape[1] > _MOST_PARAMETERS * times.size:
+    design = spectrum.differentiate_means(grid)
+    if design.shape[1] > _MOST_PARAMETERS * grid.time.size:
         return np.zeros(count, np.complex128)
     scale = np.maximum(np.linalg.norm(design, axis=0), 1e-300)
     design /= scale

@@ -43,13 +43,14 @@ _MARKS = 0.87
 _LEAST_PERIODS, _MOST = 1.25, 0.8
 # The ends of a window are cut off if this reduces the misfit to at most this fraction [-].
 _MUCH_BETTER = 0.7
-# The record leaves the fitted oscillator if a mean error over part of a period exceeds all three of these limits.
-# _SHARE_OFF: limit of the mean error, as a fraction of the vibration energy [-].
-# ERRORS_OFF: limit of the mean error [standard errors]; white noise exceeds it once in a million means.
-# _STRUCTURES_OFF: limit of the mean error, as a multiple of the systematic misfit [-].
-# _MEANS_PER_PERIOD: number of mean errors per period.
+# The record leaves the fitted oscillator if the error, averaged over a fraction of a period, exceeds three limits.
+# _SHARE_OFF: first limit of the mean error, as a fraction of the vibration energy [-].
+# ERRORS_OFF: second limit of the mean error [standard errors]; white noise exceeds it once in a million means.
+# _STRUCTURES_OFF: third limit of the mean error, as a multiple of the systematic misfit [-].
+# _MEANS_PER_PERIOD: number of intervals per period over which the error is averaged.
 _SHARE_OFF, ERRORS_OFF, _STRUCTURES_OFF, _MEANS_PER_PERIOD = 0.01, 5.0, 3.0, 25
-# Number of mean errors per energy period that are computed to detect a mode in only part of the window.
+# Number of intervals per energy period over which the error is averaged, to detect a mode that only part of the
+# window contains.
 _MEANS_PER_ENERGY_PERIOD = 4
 # An oscillator that describes at least this fraction of the bounds is used for every td in its window [-].
 _MOST_OF_BOUNDS = 0.5

@@ -308,7 +308,7 @@ class Envelope(NamedTuple):
 
 
 def find_upper_envelope(time: Samples, energy: Samples) -> Envelope | None:
-    """Find the lowest decaying exponential above all peaks, fitted near their middle; None if there are no peaks.
+    """Find the decaying exponential above all peaks that is lowest at their mean time; None if there are no peaks.
 
     Parameters
     ----------
@@ -317,8 +317,8 @@ def find_upper_envelope(time: Samples, energy: Samples) -> Envelope | None:
 
     Notes
     -----
-    On a logarithmic scale, the exponential is a straight line. The lowest line above all points is the edge of their
-    upper convex hull at their mean time. Peaks that may be errors of the solver are ignored, because they would tilt
+    On a logarithmic scale, the exponential is a straight line. It is the edge of the upper convex hull of all points
+    at their mean time. Peaks that may be errors of the solver are ignored, because they would tilt
     the line upwards at the end of a decaying vibration.
 
     Examples

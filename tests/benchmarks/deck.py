@@ -15,7 +15,8 @@ from d2rpick.deck.ls_dyna_parts import read_parts
 from d2rpick.deck.reader import read_deck
 from d2rpick.deck.switching import find_windows, read_switching
 from d2rpick.rules import check_deck
-from d2rpick.rules.rule import BACK, END, GOOD, HEAD, PARTS, THERE
+from d2rpick.rules.example import END, HEAD, PARTS
+from d2rpick.rules.rule import BACK, GOOD, THERE
 from tests.benchmarks.timing import measure_own_seconds, measure_ratio
 
 if TYPE_CHECKING:

@@ -220,13 +220,13 @@ def count_flights(run: Flown, form: str) -> Counter[str]:
         ]
     )
     largest = np.linalg.norm(run.momentum.sum(axis=1), axis=1).max()
-    inside = [impulse[(start <= TIME) & (end >= TIME)] for start, end in believed]
+    impulses = [impulse[(start <= TIME) & (end >= TIME)] for start, end in believed]
     wrong_count = sum(
         bool(
-            np.linalg.norm(flight_momentum - flight_momentum[0], axis=1).max()
+            np.linalg.norm(impulse_in_claim - impulse_in_claim[0], axis=1).max()
             > LITTLE * largest
         )
-        for flight_momentum in inside
+        for impulse_in_claim in impulses
     )
     size = np.linalg.norm(run.force, axis=1)
     edges = np.flatnonzero(
@@ -238,9 +238,9 @@ def count_flights(run: Flown, form: str) -> Counter[str]:
         if b - a > LONG * STATES
     ]
     flights = [
-        flight_momentum
-        for flight_momentum in flights
-        if _measure_steady_time(impulse, flight_momentum, LITTLE * largest) > LONG
+        flight
+        for flight in flights
+        if _measure_steady_time(impulse, flight, LITTLE * largest) > LONG
     ]
     missed = sum(
         not any(start < b and a < end for start, end in claims) for a, b in flights
@@ -254,7 +254,7 @@ def _measure_steady_time(
     impulse: Samples, flight: tuple[float, float], limit: float
 ) -> float:
     """Return how long the force changes the momentum by at most ``limit`` at the end of a flight."""
-    first, last = (round(impulse_in_flight * STATES) for impulse_in_flight in flight)
+    first, last = (round(time * STATES) for time in flight)
     momentum_change = np.linalg.norm(impulse[first : last + 1] - impulse[last], axis=1)
     return float(np.count_nonzero(momentum_change <= limit)) / STATES
 

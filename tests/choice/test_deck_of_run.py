@@ -21,7 +21,7 @@ from d2rpick.histories.history import EXACT, Given, History, Momenta
 from d2rpick.histories.names import Part
 from d2rpick.histories.surroundings import Support, Surroundings
 from d2rpick.rules import RULES, check_deck
-from d2rpick.rules.rule import Example
+from d2rpick.rules.example import Example
 from tests import made_car
 from tests.command import (
     ENERGY,

@@ -76,15 +76,21 @@ def test_the_better_pair_is_what_is_said_of_its_td(td: float) -> None:
 @pytest.mark.parametrize(
     "arguments", [{"max_residual": 0.9}, {"max_kinetic_share": 0.9}]
 )
-def test_where_nothing_vibrates_no_tr_is_acceptable_that_does_not_verify(
+def test_where_nothing_vibrates_every_tr_is_acceptable_and_verifies(
     arguments: dict[str, Any],
 ) -> None:
+    """Limits of the vibration refuse no pair there: suggest, its windows and verify agree."""
     history, settings = make_resting_history(), Settings(after=0.3, **arguments)
     answer = suggest_in_history(history, 0.8, settings)
     assert answer.situation.at_rest
-    assert not verify_in_history(history, 0.5, 0.8, settings).admissible
-    assert not answer.windows
-    assert not find_acceptable_windows(answer.situation, answer.candidates, None).size
+    assert require(answer.recommended).tr == 0.3
+    (window,) = answer.windows or ()
+    assert window.start == 0.3
+    assert window.end == pytest.approx(0.8)
+    for tr in (window.start, 0.5, window.end):
+        assert verify_in_history(history, tr, 0.8, settings).admissible
+    found = find_acceptable_windows(answer.situation, answer.candidates, None)
+    assert found.tolist() == [[0.3, pytest.approx(0.8)]]
 
 
 def test_a_start_that_is_read_does_not_lie_before_the_flight() -> None:

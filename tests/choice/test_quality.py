@@ -243,7 +243,7 @@ def test_candidates_are_kept_together_as_one_by_one(
     assert [candidate.error for candidate in ranked] == ranked.judged.error[
         ranked.order
     ].tolist()
-    assert [candidate.admissible for candidate in ranked] == ranked.judged.acceptable[
+    assert [candidate.admissible for candidate in ranked] == ranked.judged.admissible[
         ranked.order
     ].tolist()
     assert ranked[1:3] == (ranked[1], ranked[2])

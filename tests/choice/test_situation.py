@@ -1,13 +1,15 @@
 """A record as seen from one td: its contents, its vibration model, and what does not depend on td."""
 
 from dataclasses import replace
+from pathlib import Path
+from random import Random
 
 import numpy as np
 import pytest
 
 from d2rpick.choice.answers import suggest_at, suggest_in_history
 from d2rpick.choice.pair.situation import examine_td
-from d2rpick.choice.question import Settings
+from d2rpick.choice.question import Settings, read_reference
 from d2rpick.flight.position_error import RigidBody
 from d2rpick.histories.history import History
 from d2rpick.histories.opening import Selection
@@ -22,6 +24,7 @@ from tests.energies import (
     require,
 )
 from tests.reading import read
+from tests.relations import list_columns, make_run, write_csv
 
 PLAIN = Settings()
 
@@ -33,6 +36,21 @@ def test_the_basis_is_the_best_that_can_be_relied_on() -> None:
         == "energy"
     )
     assert examine_td(chain.read_chain_history(), chain.TD_LATE, PLAIN).basis == "modal"
+
+
+@pytest.mark.parametrize(
+    ("amplitude", "vibrates"), [(0.0, False), (1e-9, False), (1e-3, True)]
+)
+def test_rounding_errors_of_a_kinetic_energy_are_no_vibration(
+    tmp_path: Path, amplitude: float, vibrates: bool
+) -> None:
+    run = make_run(Random(1))
+    kinetic = 0.3 + amplitude * run.kinetic / run.kinetic.max()
+    names = write_csv(tmp_path, {**list_columns(run), "kinetic_energy": kinetic})
+    history = read_reference(names, Selection()).history
+    settings = Settings(after=run.load_end, landing=run.landing)
+    together = examine_td(history, run.td, settings).together
+    assert (together.kinetic is not None) is vibrates
 
 
 @pytest.mark.slow

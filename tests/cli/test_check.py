@@ -14,7 +14,8 @@ import pytest
 
 import d2rpick as d2
 from d2rpick.rules import RULES
-from d2rpick.rules.rule import END, GOOD, HEAD, PARTS, THERE, write_automatic_card
+from d2rpick.rules.example import END, HEAD, PARTS, write_automatic_card
+from d2rpick.rules.rule import GOOD, THERE
 from tests.command import BOX, DECK, ENERGY, GLSTAT, MATSUM, read_refusal, run, run_json
 from tests.json_schemas import (
     check_by_schema,

@@ -47,7 +47,7 @@ suggest --td 1 --step-ratio 0.5 --cost-share 0.5 x | --step-ratio | at least 1 w
 parts --deck x --step-ratio 0.5 x | --step-ratio | at least 1 was expected
 # contradictions
 verify --tr 0.07 --td 0.064 {ENERGY} | tr 0.07 is not before td 0.064
-verify --tr 0.064 --td 0.064 {ENERGY} | tr 0.064 is not before td 0.064
+verify --tr 0.064 --td 0.064 {ENERGY} | tr and td are both 0.064; give a td after tr
 suggest --td -1 {ENERGY} | {ENERGY} | --td -1 lies outside the record, 0 to 0.15
 verify --tr -1 --td 0.064 {ENERGY} | {ENERGY} | --tr -1 lies outside the record, 0 to 0.15
 suggest --td 0.064 {GIVEN} --no-verify {ENERGY} | an oscillator | --no-verify | exclude

@@ -20,7 +20,8 @@ from d2rpick.deck.printing import print_cards
 from d2rpick.deck.reader import read_deck
 from d2rpick.deck.writing import write_deck
 from d2rpick.rules import RULES, check_deck
-from d2rpick.rules.rule import BACK, GOOD, PARTS, THERE
+from d2rpick.rules.example import PARTS
+from d2rpick.rules.rule import BACK, GOOD, THERE
 from tests.decks import list_spans, write
 from tests.sample_deck import DECK
 

@@ -10,7 +10,8 @@ from hypothesis import given, strategies as st
 
 from d2rpick.base.errors import D2RPickError
 from d2rpick.rules import check_deck
-from d2rpick.rules.rule import END, GOOD, HEAD, PARTS
+from d2rpick.rules.example import END, HEAD, PARTS
+from d2rpick.rules.rule import GOOD
 from tests.decks import list_spans, read, write
 
 TIMES = st.integers(1, 10**6).map(lambda n: n / 1000)

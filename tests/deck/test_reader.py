@@ -11,7 +11,8 @@ from d2rpick.deck.reader import has_mesh, read_deck
 from d2rpick.deck.source import Block, SourceFile, find_marks
 from d2rpick.deck.stored import HeldInMemory
 from d2rpick.deck.switching import read_switching
-from d2rpick.rules.rule import BACK, END, GOOD, HEAD, PARTS, THERE, write_automatic_card
+from d2rpick.rules.example import END, HEAD, PARTS, write_automatic_card
+from d2rpick.rules.rule import BACK, GOOD, THERE
 from tests.decks import count_findings, list_spans, read
 
 WINDOW = [(1, 0.02, 0.09)]

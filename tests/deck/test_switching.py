@@ -6,7 +6,7 @@ import pytest
 
 from d2rpick.deck.ls_dyna_inventory import find_shared_nodes
 from d2rpick.deck.ls_dyna_parts import find_element_cards, read_parts
-from d2rpick.rules.rule import PARTS, write_automatic_card
+from d2rpick.rules.example import PARTS, write_automatic_card
 from tests.decks import list_spans, pad, read, windows
 
 Spans = list[tuple[int | None, float, float | None]]
@@ -149,7 +149,7 @@ def test_a_set_of_unknown_members_stays_a_set(tmp_path: Path, cards: str) -> Non
     ("deck", "expected"), PART_CARDS.values(), ids=PART_CARDS.keys()
 )
 def test_parts(tmp_path: Path, deck: str, expected: dict[int, str]) -> None:
-    assert read_parts(read(tmp_path, deck)).materials == expected
+    assert read_parts(read(tmp_path, deck)).material_by_part == expected
 
 
 @pytest.mark.parametrize("name", ["*MAT_RIGID", "*MAT_020", "*mat_rigid_title"])

@@ -7,7 +7,7 @@ import pytest
 import d2rpick as d2
 from d2rpick.deck import read_inventory
 from d2rpick.rules import check_deck
-from d2rpick.rules.rule import write_engine_files, write_starter_deck
+from d2rpick.rules.example import write_engine_files, write_starter_deck
 from tests.command import MATSUM, put
 from tests.decks import pad
 

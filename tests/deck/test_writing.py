@@ -12,7 +12,8 @@ from d2rpick.deck.radioss_deck import RadiossLeg
 from d2rpick.deck.radioss_run import read_run
 from d2rpick.deck.writing import write_deck
 from d2rpick.rules import RULES, check_deck
-from d2rpick.rules.rule import END, GOOD, HEAD, PARTS, THERE
+from d2rpick.rules.example import END, HEAD, PARTS
+from d2rpick.rules.rule import GOOD, THERE
 from tests.decks import write
 
 WINDOWS = [(0.02, 0.09), (0.1, 0.15)]

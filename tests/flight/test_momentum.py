@@ -170,6 +170,29 @@ def smooth(seed: int, waves: int, digits: int) -> Momenta:
 # Motions made up of pieces.
 
 
+@pytest.mark.parametrize("speed", [3.0, 30.0])
+def test_a_fall_is_found_if_its_times_have_as_few_digits_as_its_momenta(
+    speed: float,
+) -> None:
+    # In milliseconds: the load ends at 20, and an interval of 0.13 is printed as 0.1 or 0.2 after 100.
+    mass, gravity, load_end = 1000.0, 9.81e-6, 20.0
+    time = np.linspace(0.0, 240.0, 1866)
+    push = 1e-3 * speed * np.minimum(time / load_end, 1.0) ** 2
+    velocity = np.stack([push, np.full(time.shape, 4e-3), -gravity * time], axis=1)
+    momenta = Momenta(
+        round_as_printed(time, 4),
+        round_as_printed(mass * velocity.ravel(), 4).reshape(-1, 1, 3),
+        None,
+        Precision(4),
+        chosen=(0,),
+        masses=np.array([mass]),
+    )
+    flight = require(find_flight_around(momenta, 150.0))
+    assert flight.start == pytest.approx(load_end, abs=0.5)
+    assert flight.end == momenta.time[-1]
+    assert flight.gravity == pytest.approx(gravity, rel=2e-3)
+
+
 @pytest.mark.slow
 @given(
     start=st.floats(0.04, 0.16),

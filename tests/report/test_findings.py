@@ -12,7 +12,8 @@ from d2rpick.api.checking import Findings
 from d2rpick.report import formats, rule_texts
 from d2rpick.rules import RULES, Checked, check_deck
 from d2rpick.rules.base import Finding, Severity
-from d2rpick.rules.rule import END, GOOD, HEAD, PARTS, write_automatic_card
+from d2rpick.rules.example import END, HEAD, PARTS, write_automatic_card
+from d2rpick.rules.rule import GOOD
 from tests.command import ROOT
 from tests.deck.test_radioss_run import write_run
 from tests.decks import write
@@ -50,7 +51,10 @@ def write_findings(
 
 def test_table(results: list[Checked], tmp_path: Path) -> None:
     lines = write_findings("table", results, tmp_path).split("\n")
-    assert lines[0] == "main.k"
+    assert lines[0] == "errors  in 1 of 2 decks"
+    assert lines[1].startswith("why     ")
+    assert lines[1].endswith(" (D2R101)")
+    assert lines[lines.index("") + 1] == "main.k"
     assert "  part 1: rigid from 0.02 to 0.5 (main.k:14)" in lines
     assert "  part 2: rigid from 0.02 to the end (main.k:14)" in lines
     assert any(
@@ -65,7 +69,10 @@ def test_table(results: list[Checked], tmp_path: Path) -> None:
 def test_a_card_without_a_window_is_not_passed_over(tmp_path: Path) -> None:
     deck = write_run(tmp_path, legs=(("0.2", "/RBODY/ON\n0\n"),))  # without a main node
     lines = write_findings("table", [check_deck(deck)], tmp_path).split("\n")
-    assert lines[:2] == ["box_0000.rad", "  switching cards that switch nothing"]
+    assert lines[:2] == [
+        "box_0000.rad",
+        "  no part becomes rigid, although the deck has switching cards",
+    ]
 
 
 def test_json(results: list[Checked], tmp_path: Path) -> None:
@@ -170,3 +177,20 @@ def test_only_a_deck_of_another_name_is_named() -> None:
     ]
     assert deck_names
     assert "main.k" not in deck_names
+
+
+def test_many_decks_begin_with_the_decision_and_end_with_those_without_findings(
+    tmp_path: Path,
+) -> None:
+    decks = [tmp_path / f"{letter}.k" for letter in "abc"]
+    for deck in decks[:2]:
+        deck.write_text("*KEYWORD\n*END\n")
+    decks[2].write_text("*KEYWORD\n*INCLUDE\nmissing.k\n*END\n")
+    results = [check_deck(str(deck)) for deck in decks]
+    lines = write_findings("table", results, tmp_path).split("\n")
+    assert lines[0] == "errors  in 1 of 3 decks"
+    assert lines[2].startswith("next    correct what the lines above report")
+    assert lines[4] == "c.k"
+    assert lines[-3] == "no findings in 2 decks without rigid windows: a.k, b.k"
+    passed = write_findings("table", results[:2], tmp_path).split("\n")
+    assert passed[0] == "passed  no errors or warnings in 2 decks"

@@ -8,7 +8,7 @@ import pytest
 
 import d2rpick as d2
 from d2rpick.rules import RULES
-from d2rpick.rules.rule import write_engine_files, write_starter_deck
+from d2rpick.rules.example import write_engine_files, write_starter_deck
 from tests.command import put, run, run_json
 from tests.decks import pad, write
 from tests.histories.test_contact_forces import TIMES, t01

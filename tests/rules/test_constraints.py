@@ -7,7 +7,7 @@ import pytest
 
 from d2rpick.rules import check_deck
 from d2rpick.rules.base import Finding
-from d2rpick.rules.rule import END, HEAD, PARTS, write_automatic_card
+from d2rpick.rules.example import END, HEAD, PARTS, write_automatic_card
 from tests.decks import make_row, pad, write
 
 # Parts 1, 2 and 3 without a node in common; part 3 is rigid from the start.

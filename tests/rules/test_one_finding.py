@@ -6,7 +6,7 @@ import pytest
 
 from d2rpick.base.errors import ConfigurationError
 from d2rpick.rules import RULES, Configuration, check_deck, find_rules
-from d2rpick.rules.rule import HEAD, PARTS, write_automatic_card
+from d2rpick.rules.example import HEAD, PARTS, write_automatic_card
 from tests.command import run, run_json
 from tests.decks import write
 

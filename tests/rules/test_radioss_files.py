@@ -7,7 +7,7 @@ import pytest
 from d2rpick.deck import find_main_decks
 from d2rpick.deck.radioss_bodies import find_bodies
 from d2rpick.rules import check_deck
-from d2rpick.rules.rule import write_engine_files, write_starter_deck
+from d2rpick.rules.example import write_engine_files, write_starter_deck
 from tests.command import put, run
 
 ENGINE = write_engine_files(("0.2", "OFF"))["box_0001.rad"]

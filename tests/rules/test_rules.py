@@ -18,16 +18,8 @@ from d2rpick.rules import (
     read_configuration,
 )
 from d2rpick.rules.base import Severity
-from d2rpick.rules.rule import (
-    END,
-    GOOD,
-    HEAD,
-    PARTS,
-    THERE,
-    Example,
-    Rule,
-    write_automatic_card,
-)
+from d2rpick.rules.example import END, HEAD, PARTS, Example, write_automatic_card
+from d2rpick.rules.rule import GOOD, THERE, Rule
 from tests.command import run, run_json
 from tests.decks import count_findings, write
 

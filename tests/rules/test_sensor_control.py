@@ -9,7 +9,7 @@ from hypothesis import given, strategies as st
 
 from d2rpick.deck.ls_dyna_sensors import follow_control, read_controls
 from d2rpick.deck.reader import read_deck
-from d2rpick.rules.rule import HEAD, PARTS, make_deck, write_automatic_card
+from d2rpick.rules.example import HEAD, PARTS, make_deck, write_automatic_card
 from tests.command import put, read_refusal, run, run_json
 from tests.rules.test_by_force import list_windows
 

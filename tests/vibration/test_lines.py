@@ -6,7 +6,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from d2rpick.vibration.lines import Exponentials, fit_spectrum, make_even_grid, predict
+from d2rpick.vibration.doubts import MOST_MISSED
+from d2rpick.vibration.lines import (
+    Exponentials,
+    fit_spectrum,
+    is_unpredictable,
+    make_even_grid,
+    predict,
+)
 from tests.energies import require
 from tests.vibration.linear_structure import LinearStructure
 
@@ -99,3 +106,34 @@ def test_a_line_that_stands_out_of_the_noise_is_found() -> None:
     energy = 2.0 + np.cos(20.0 * TIME) + 0.03 * np.cos(31.0 * TIME) + noise
     lines = require(predict(make_even_grid(TIME, energy))).spectrum.lines
     assert np.abs(lines.poles.imag - 31.0).min() < 0.2
+
+
+@settings(max_examples=15, deadline=None)
+@given(st.integers(0, 10**6), st.sampled_from([0.0, 0.02, 0.1]))
+def test_no_energy_that_lines_predict_is_called_unpredictable(
+    seed: int, noise: float
+) -> None:
+    energy = LinearStructure.draw(seed, 8).elastic_energy(TIME)
+    scatter = (
+        noise * np.std(energy) * np.random.default_rng(seed).normal(size=TIME.size)
+    )
+    grid = make_even_grid(TIME, energy + scatter)
+    if require(predict(grid)).missed < MOST_MISSED / 2:
+        assert not is_unpredictable(grid, MOST_MISSED)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_random_walk_is_unpredictable(seed: int) -> None:
+    walk = np.cumsum(np.random.default_rng(seed).normal(size=3000))
+    grid = make_even_grid(np.linspace(0.0, 1.0, walk.size), walk)
+    assert is_unpredictable(grid, MOST_MISSED)
+    assert require(predict(grid)).missed > MOST_MISSED
+
+
+def test_the_quick_test_needs_a_fine_grid_whose_swing_it_can_see() -> None:
+    walk = np.cumsum(np.random.default_rng(1).normal(size=500))
+    assert not is_unpredictable(make_even_grid(TIME[:500], walk), MOST_MISSED)
+    burst = np.where(TIME > 5.0, np.cos(600.0 * TIME), 0.0)
+    grid = make_even_grid(TIME, burst)
+    assert require(predict(grid)).missed > MOST_MISSED
+    assert not is_unpredictable(grid, MOST_MISSED)

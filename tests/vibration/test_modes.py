@@ -1,13 +1,14 @@
 """Closed form of a single-mode energy history."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
 from d2rpick.histories.history import Samples
-from d2rpick.vibration.modes import Mode
+from d2rpick.vibration.modes import Mode, compute_deformations
 from tests import paper
 from tests.records import MODE
 
@@ -148,6 +149,16 @@ def test_crossings_are_all_sign_changes_on_a_fine_grid(
     # every crossing on the grid was found; two crossings inside one grid cell show only as a pair
     assert len(crossings) >= np.count_nonzero(above[1:] != above[:-1])
     assert (len(crossings) - np.count_nonzero(above[1:] != above[:-1])) % 2 == 0
+
+
+@given(st.lists(MODES, min_size=1, max_size=9), st.integers(1, 70))
+def test_deformations_of_all_modes_at_once_are_those_of_each_mode(
+    modes: list[Mode], count: int
+) -> None:
+    moved = [replace(mode, origin=modes[0].origin) for mode in modes]
+    times = np.linspace(-1.0, 2.0, count)
+    expected = [mode.deformation(times) for mode in moved]
+    np.testing.assert_array_equal(compute_deformations(moved, times), expected)
 
 
 def test_an_extremum_that_touches_the_level_is_no_crossing_and_both_ends_are_outside() -> (

@@ -47,6 +47,29 @@ def test_a_line_that_dies_early_is_found_although_noise_outlasts_it(
     assert measure_rate_errors(refined, structure).max() < 0.05
 
 
+def test_the_first_part_keeps_two_lines_that_hardly_part_in_it() -> None:
+    # The two lines of the energy are half a cycle apart over the record.
+    time = TIME[::4]
+    rates = np.pi * np.array([80.0, 80.5]) / (time[-1] - time[0])
+    amplitudes = np.array([0.7, 1.0])
+    structure = LinearStructure(amplitudes, np.zeros(2), rates, np.array([0.4, 1.1]))
+    energy = structure.elastic_energy(time)
+    before: list[Samples] = []
+    after: list[Samples] = []
+    for seed in range(6):
+        normal = np.random.default_rng(seed).standard_normal(time.size)
+        grid = make_even_grid(time, energy + NOISE * np.ptp(energy) * normal)
+        prediction = require(predict(grid))
+        for predicted, errors in (
+            (prediction, before),
+            (refine_prediction(grid, prediction), after),
+        ):
+            heights = 2 * np.abs(predicted.of_first_part.lines.weights)
+            errors.append(np.sort(heights) / amplitudes**2 - 1)
+    assert np.abs(after).max() < 0.5 < np.abs(before).max()
+    assert np.std(after) < 0.5 * np.std(before)
+
+
 def test_a_line_that_stands_out_of_the_misfit_is_found() -> None:
     time = TIME[::24]
     waves = (

@@ -1,11 +1,13 @@
 r"""Predict the motion after td: how much mean energy a pair preserves, and its error relative to the next contact.
 
-An elastic energy V that is released at rest is shared equally between internal and kinetic energy.  With the static
-energy S and the vibration energy U of the reference run at td, the ratio of the mean internal energies after td is
+An elastic energy V that is released at rest is shared equally between internal and kinetic energy.  With the
+static energy S and the vibration energy U of the reference run, the ratio of the mean internal energies after td is
 
-.. math:: \frac{S + V(t_r)/2}{S + U(t_d)/2}
+.. math:: \frac{S(t_r) + V(t_r)/2}{S(t_d) + U(t_d)/2}
 
-The fluctuation of the energy in the flight gives bounds of U, and thereby of S.
+The static energy grows in the flight if heat or plastic work is added to it; rigid parts do not gain this energy.
+If V is not known at each time, S is treated as constant. The fluctuation of the energy in the flight gives bounds of U,
+and thereby of S.
 """
 
 from __future__ import annotations
@@ -53,9 +55,11 @@ def bound_mean_energy(
     """Return bounds of the mean energy after td for one tr; None if the bounds are unknown."""
     if situation.at_rest:
         return MeanEnergyBounds(1.0, 1.0)
+    if not situation.energy_td > 0:
+        return None
     ratios = [
-        _compute_mean_ratio(candidate.energy, situation.energy_td, *energies)
-        for energies in _bound_vibration_energies(situation)
+        _compute_mean_ratio(candidate.energy, situation.energy_td, energies)
+        for energies in _bound_vibration_energies(situation, candidate.tr)
     ]
     finite = [ratio for ratio in ratios if np.isfinite(ratio)]
     if not finite:
@@ -73,31 +77,54 @@ def bound_mean_energy(
     )
 
 
-def _compute_mean_ratio(
-    energy_tr: float, energy_td: float, elastic_td: float, whole: float
-) -> float:
-    """Return the mean energy after td relative to the reference run [-].
+class _VibrationEnergies(NamedTuple):
+    """Elastic part of the vibration energy at tr (None if unknown) and at td, and all of it at td [energy]."""
 
-    ``elastic_td`` is the elastic part of the vibration energy at td, and ``whole`` all of it [energy].
-    """
-    static = max(energy_td - elastic_td, 0.0)
-    reference = static + whole / 2
+    elastic_tr: float | None
+    elastic_td: float
+    whole: float
+
+
+def _compute_mean_ratio(
+    energy_tr: float, energy_td: float, vibration: _VibrationEnergies
+) -> float:
+    """Return the mean energy after td relative to the reference run [-]."""
+    static_td = max(energy_td - vibration.elastic_td, 0.0)
+    elastic_tr = vibration.elastic_tr
+    if elastic_tr is None:
+        elastic_tr = energy_tr - static_td
+    elastic_tr = min(max(elastic_tr, 0.0), max(energy_tr, 0.0))
+    static_tr = static_td if vibration.elastic_tr is None else energy_tr - elastic_tr
+    reference = static_td + vibration.whole / 2
     if reference > 0:
-        return (static + max(energy_tr - static, 0.0) / 2) / reference
+        return (static_tr + elastic_tr / 2) / reference
     return np.nan
 
 
-def _bound_vibration_energies(situation: Situation) -> list[tuple[float, float]]:
-    """Return lower and upper bounds of the vibration energy at td, each as (elastic energy, total energy) [energy]."""
-    compared = situation.vibration.compared
-    if compared is not None:
-        elastic = float(compared.deformation.elastic_energy(situation.td))
-        whole = float(compared.deformation.vibration_energy(situation.td))
+def _bound_vibration_energies(
+    situation: Situation, tr: float
+) -> list[_VibrationEnergies]:
+    """Return lower and upper bounds of the vibration energies at tr and td."""
+    vibration = situation.vibration
+    if vibration.compared is not None:
+        deformation = vibration.compared.deformation
+        elastic_td = float(deformation.elastic_energy(situation.td))
+        whole = float(deformation.vibration_energy(situation.td))
+        elastic_tr = None
+        if vibration.comparable(np.array(tr)):
+            elastic_tr = float(deformation.elastic_energy(tr))
         if situation.basis == "oscillator":
             scales: tuple[float, ...] = (1.0,)
         else:
             scales = (1 - _KNOWN_WITHIN, 1 + _KNOWN_WITHIN)
-        return [(scale * elastic, scale * whole) for scale in scales]
+        return [
+            _VibrationEnergies(
+                None if elastic_tr is None else scale * elastic_tr,
+                scale * elastic_td,
+                scale * whole,
+            )
+            for scale in scales
+        ]
     bounds = bound_vibration_energy(situation)
     if bounds is None:
         return []
@@ -106,9 +133,37 @@ def _bound_vibration_energies(situation: Situation) -> list[tuple[float, float]]
     damping_left = 1 / compute_mean_decay(situation, time)
     # On average, half of the vibration energy is internal energy, which adds to the static energy.
     return [
-        (max(situation.energy_td - (mean - whole / 2), 0.0), damping_left * whole)
+        _VibrationEnergies(
+            None,
+            max(situation.energy_td - (mean - whole / 2), 0.0),
+            damping_left * whole,
+        )
         for whole in bounds
     ]
+
+
+def compute_static_change(situation: Situation, candidate: Candidate) -> float | None:
+    """Return by how much the static energy changes from tr to td, relative to the mean energy after td [-].
+
+    It is the smallest change that the bounds of the vibration energy allow; 0 if they have different signs. It is None
+    if the vibration energy at tr or the mean energy is unknown, or if nothing vibrates.
+    """
+    if situation.at_rest:
+        return None
+    changes = []
+    for vibration in _bound_vibration_energies(situation, candidate.tr):
+        static_td = max(situation.energy_td - vibration.elastic_td, 0.0)
+        mean = static_td + vibration.whole / 2
+        if vibration.elastic_tr is None or not mean > 0:
+            return None
+        changes.append(
+            (static_td - max(candidate.energy - vibration.elastic_tr, 0.0)) / mean
+        )
+    if not changes:
+        return None
+    if min(changes) < 0 < max(changes):
+        return 0.0
+    return min(changes, key=abs)
 
 
 def bound_vibration_energy(situation: Situation) -> tuple[float, float] | None:

@@ -190,8 +190,8 @@ class Judged:
         ]
 
     @cached_property
-    def acceptable(self) -> NDArray[np.bool_]:
-        """True for each candidate without objections, shape (n,)."""
+    def admissible(self) -> NDArray[np.bool_]:
+        """True for each candidate without objections, shape (n,); see `Candidate` for the words."""
         return np.asarray(
             ~np.logical_or.reduce([objection.holds for objection in self.objections])
         )
@@ -199,7 +199,7 @@ class Judged:
     @property
     def recommendable(self) -> NDArray[np.bool_]:
         """True for each candidate that ``suggest`` and ``verify`` accept: it has no objections and exceeds no limit."""
-        return self.acceptable & self.within_limits
+        return self.admissible & self.within_limits
 
     @property
     def within_limits(self) -> NDArray[np.bool_]:
@@ -462,7 +462,7 @@ def _find_start_at_rest(situation: Situation) -> Moments | None:
 
 
 def _mark_given_as_matches(situation: Situation, moments: Moments) -> Moments:
-    """Set the kind of each tr that coincides with a closest match to "match", as its accuracy is that of a match."""
+    """Set the kind of a given tr to "match" if it coincides with a closest match, because it is just as accurate."""
     is_given = moments.are("given")
     vibration = situation.vibration
     if situation.at_rest or not (is_given.any() and vibration.profile):

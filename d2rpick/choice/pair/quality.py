@@ -10,9 +10,19 @@ import numpy as np
 from d2rpick.base.errors import list_names
 from d2rpick.base.memory import remember
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.choice.pair.aftermath import compare_error_with_contact
+from d2rpick.choice.pair.aftermath import (
+    compare_error_with_contact,
+    compute_static_change,
+)
 from d2rpick.choice.pair.candidates import Candidates, judge_candidates
-from d2rpick.choice.pair.grades import FAIR, GOOD, GRADES, POOR, format_residual
+from d2rpick.choice.pair.grades import (
+    FAIR,
+    GOOD,
+    GRADES,
+    MIN_MEAN_ENERGY,
+    POOR,
+    format_residual,
+)
 from d2rpick.choice.pair.moving_apart import find_parts_moving_apart
 from d2rpick.choice.pair.warnings import (
     POOR_KINETIC_SHARE,
@@ -25,7 +35,7 @@ from d2rpick.vibration.measures import TOLERATED_GROWTH
 from d2rpick.vibration.model import NOTHING_KEPT
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Iterator, Sequence
 
     from numpy.typing import NDArray
 
@@ -64,12 +74,11 @@ ENOUGH_STATES: Final = 200
 _FEW_STATES: Final = 20
 # Largest number of parts that are named in a sentence.
 _NAMED: Final = 5
+# Number of neighbouring states that noise around zero does not make negative by chance.
+_NEIGHBOURS: Final = 3
 _WRONG_BY_MORE: Final = "the vibration after td is wrong by more than"
-_MORE_OFTEN: Final = "write the energies more often"
-_NAME_PARTS: Final = "name the parts to be switched with `parts`"
-_VERIFY_PARTS: Final = (
-    "judge the pair with d2rpick verify by the energy of its parts (`parts`)"
-)
+MORE_OFTEN: Final = "write the energies more often"
+NAME_PARTS: Final = "name the parts to be switched with `parts`"
 CHOOSE_TIMES_IN_FLIGHT: Final = "choose tr and td in one flight"
 _CORRECT_THE_DECK: Final = "correct the deck, and run the reference again"
 _CHECK_GIVEN_TIMES: Final = (
@@ -77,8 +86,8 @@ _CHECK_GIVEN_TIMES: Final = (
     "or let the evidence decide, without `after` and `landing`"
 )
 # End of the advice on a pair, which is omitted if a finished switched run is already available.
-_COMPARE: Final = "compare with a finished switched run"
-_OR_COMPARE: Final = f", or {_COMPARE}"
+COMPARE: Final = "compare with a finished switched run"
+OR_COMPARE: Final = f", or {COMPARE}"
 
 
 def rank_candidates(
@@ -101,7 +110,7 @@ def rank_judged(judged: Judged) -> Iterator[Candidates]:
     in order of error.
     """
     late = (judged.columns["same_swing"] != 0) | judged.near_td
-    group = np.where(judged.acceptable, late, np.int8(2)) + 3 * judged.situation_of
+    group = np.where(judged.admissible, late, np.int8(2)) + 3 * judged.situation_of
     situations = judged.situations
     room = np.repeat([get_limit_of_like_quality(each) for each in situations], 3)
     residual = judged.columns["residual"]
@@ -179,7 +188,7 @@ def order_by_quality(
     is_off: NDArray[np.bool_],
     room: Samples,
 ) -> NDArray[np.intp]:
-    """Return the order of the candidates, group by group. The best candidates, which are equally good, come first.
+    """Return the order of the candidates, group by group; in each group, the best candidates come first.
 
     The best candidates of a group are the good ones. If there is none, they are the candidates whose error exceeds the
     smallest one by at most ``room``, shape (groups,), or whose error lies within the band of the best candidate. They
@@ -283,6 +292,10 @@ class Cause(NamedTuple):
 _NOT_CERTAIN: Final = Cause(
     "the flight is not certain",
     "write the part momenta (LS-DYNA matsum, Radioss /TH/PART), or give the end of the load as `after`",
+)
+_NEGATIVE_ENERGY: Final = Cause(
+    "the energy becomes negative, which an internal energy never does",
+    "name the internal energy with `energy` or `parts`",
 )
 _UNKNOWN_OUTSIDE: Final = Cause(
     "the error of the vibration is unknown, because tr or td lies outside the flight",
@@ -488,11 +501,31 @@ def _list_causes_for_poor(
     elif best.residual > POOR_RESIDUAL:
         wrong = _describe_wrong_tr(best, best.residual, best_residual)
         causes.append(wrong or _describe_wrong_vibration(situation, best.residual))
+    record = situation.history, situation.flight.start, situation.td
+    if _is_energy_negative(*record):
+        causes.append(_NEGATIVE_ENERGY)
     if situation.basis == "energy":
-        causes += _list_causes_of_record(
-            situation.history, situation.flight.start, situation.td
-        )
+        causes += _list_causes_of_record(*record)
+    causes += _list_causes_of_static_change(situation, best)
     return causes
+
+
+def _list_causes_of_static_change(
+    situation: Situation, best: Candidate
+) -> Iterator[Cause]:
+    """Yield the cause that rigid parts miss too large a change of the static energy."""
+    change = compute_static_change(situation, best)
+    if change is None or abs(change) <= 1 - MIN_MEAN_ENERGY:
+        return
+    verb, missed = ("rises", "gain") if change > 0 else ("falls", "lose")
+    kind = f"the internal energy {verb} between tr and td by more than the vibration explains"
+    yield Cause(
+        f"{kind}: by {abs(change):.0%} of its mean after td, an energy that rigid parts do not {missed}",
+        "use d2rpick explore to find times between which it changes less, and find out what changes it: a load, "
+        "plastic flow, or a part that was not chosen",
+        needs_other_times=True,
+        kind=kind,
+    )
 
 
 def _describe_unknown_direction(situation: Situation) -> Cause:
@@ -509,40 +542,12 @@ def _describe_unknown_direction(situation: Situation) -> Cause:
             kind=unknown,
         )
     for_modes = _describe_cure_for_modes(situation)
-    if for_modes and (not cures or for_modes != _MORE_OFTEN):
+    if for_modes and (not cures or for_modes != MORE_OFTEN):
         cures.append(for_modes)
     return Cause(
         f"{unknown}{why}",
-        f"{', '.join(cures)}{_OR_COMPARE}" if cures else _COMPARE,
+        f"{', '.join(cures)}{OR_COMPARE}" if cures else COMPARE,
         kind=unknown,
-    )
-
-
-def omit_comparison(quality: Quality) -> Quality:
-    """Return the grades without the advice to compare with a switched run, for use after this comparison."""
-
-    def omit(cure: str) -> str:
-        return _MORE_OFTEN if cure == _COMPARE else cure.removesuffix(_OR_COMPARE)
-
-    return _edit_cures(quality, omit)
-
-
-def name_parts_in_verify(quality: Quality) -> Quality:
-    """Return the grades for a check, which has no option for parts: its cure names the command that has one."""
-    return _edit_cures(quality, lambda cure: cure.replace(_NAME_PARTS, _VERIFY_PARTS))
-
-
-def _edit_cures(quality: Quality, edit: Callable[[str], str]) -> Quality:
-    """Return the grades with every cure replaced by what ``edit`` returns for it."""
-
-    def edit_grade(grade: Grade) -> Grade:
-        causes = [cause._replace(cure=edit(cause.cure)) for cause in grade.causes]
-        return grade._replace(causes=tuple(causes))
-
-    return quality._replace(
-        motion=edit_grade(quality.motion),
-        vibration=edit_grade(quality.vibration),
-        alone=edit_grade(quality.alone),
     )
 
 
@@ -579,12 +584,12 @@ def _describe_cure_for_modes(situation: Situation) -> str:
     if others_are_springs:
         return ""
     if situation.history.parts is None and not other_parts:
-        return f"{_NAME_PARTS}, if the files contain parts"
+        return f"{NAME_PARTS}, if the files contain parts"
     if other_parts:
         names = list_names([part.name for part in other_parts], most=_NAMED)
         vibrates = "it vibrates" if len(other_parts) == 1 else "they vibrate"
         return f"also make {names} rigid, because {vibrates} together with the chosen parts"
-    return _MORE_OFTEN
+    return MORE_OFTEN
 
 
 def _describe_wrong_tr(
@@ -637,24 +642,32 @@ def _list_causes_of_record(
     """Return the reasons why the states of the flight up to td do not suffice to determine the energy level."""
     _, energy = history.between(-np.inf if start is None else start, td)
     causes = []
-    if energy.size and energy.min() < MIN_PLASTIC * np.abs(energy).max():
-        causes.append(
-            Cause(
-                "the energy becomes negative, which an internal energy never does",
-                "name the internal energy with `energy` or `parts`",
-            )
-        )
     states = count_states_per_period(energy)
     if states is not None and states < MIN_SAMPLES_PER_PERIOD:
         states_text = f"the energy has {states:.3g} states per period"
         causes.append(
             Cause(
                 f"{states_text}, at least {MIN_SAMPLES_PER_PERIOD} are needed to compare energies",
-                f"{_MORE_OFTEN}, at least {MIN_SAMPLES_PER_PERIOD / states:.2g} times as often",
+                f"{MORE_OFTEN}, at least {MIN_SAMPLES_PER_PERIOD / states:.2g} times as often",
                 kind=f"the energy has fewer than {MIN_SAMPLES_PER_PERIOD} states per period",
             )
         )
     return tuple(causes)
+
+
+@remember
+def _is_energy_negative(history: History, start: float | None, td: float) -> bool:
+    """Return True if the energy is clearly negative in several neighbouring states of the flight up to td.
+
+    Noise around zero is negative in single states.
+    """
+    _, energy = history.between(-np.inf if start is None else start, td)
+    if energy.size < _NEIGHBOURS:
+        return False
+    highest_of_neighbours = np.lib.stride_tricks.sliding_window_view(
+        energy, _NEIGHBOURS
+    ).max(axis=1)
+    return bool(highest_of_neighbours.min() < MIN_PLASTIC * np.abs(energy).max())
 
 
 def rate_certainty_of_tr(best: Candidate) -> int:

@@ -679,12 +679,11 @@ def _describe_in_load(situation: Situation) -> str:
 
 def _describe_keeps_nothing(situation: Situation, residual: float) -> str:
     """State that a pair's residual exceeds that of a release without vibration, or the smallest residual at this td."""
-    limit = NOTHING_KEPT
-    better = f"{limit:g}, the residual of a release without any vibration"
+    smallest = situation.vibration.least_residual or 0.0
+    better = f"{NOTHING_KEPT:g}, the residual of a release without any vibration"
     if situation.vibration.keeps_nothing:
-        limit = situation.vibration.least_residual or 0.0
-        better = f"{limit:.2g}, the smallest at this td"
-    return f"residual {format_beyond_limit(residual, limit)}, more than {better}"
+        better = f"{smallest:.3f}, the smallest at this td"
+    return f"residual {residual:.3f}, more than {better}"
 
 
 def _describe_above_reference(means: Means | None, energy: float) -> Iterator[str]:

@@ -280,10 +280,9 @@ def interpolate_error(profile: Samples, time: float) -> float:
 
 
 def _compute_errors(situation: Situation, times: Samples) -> Samples:
-    """Return the stated residuals or, if only the energy is known, the level errors, in the shape of ``times`` [-].
+    """Return the residuals or, where they are unknown, the level errors of the energy, in the shape of ``times`` [-].
 
-    The stated residual of a pair includes the error band of the model, so it may exceed the error that is compared with
-    the tolerance.
+    A residual includes the error band of the model, so it may exceed the error that is compared with the tolerance.
     """
     if situation.at_rest or not times.size:
         return np.zeros(times.shape)

@@ -265,6 +265,10 @@ def read_observations(folder: str) -> tuple[Observation, ...]:
         raise DeckError(
             f"{folder}: a file, the folder of one run was expected; give the folder that contains it"
         )
+    if not Path(folder).exists():
+        raise DeckError(
+            f"{folder}: no such folder; give the folder that contains the deck and the listings of one run"
+        )
     decks = find_main_decks(
         folder, "give the folder that contains the deck and the listings of one run"
     )

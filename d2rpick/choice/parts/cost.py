@@ -77,7 +77,7 @@ class Weights:
 
     @cached_property
     def _scale_of_built_in(self) -> float:
-        """Median ratio of these weights to the built-in weights of the same classes [-]; 0 if no class is common."""
+        """Median ratio of these weights to the built-in weights of the same classes [-]; 0 if they share no class."""
         from statistics import median  # Imported here to keep start-up fast.
 
         common = [name for name in self.per_element if name in MEASURED]
@@ -85,7 +85,7 @@ class Weights:
         return median(ratios) if ratios else 0.0
 
     def find_weight(self, formulation: Formulation) -> float | None:
-        """Return the cost of an element; None if neither the formulation nor the class of its cost has a weight."""
+        """Return the cost of an element; None if neither its formulation nor its cost class has a weight."""
         weight = self.per_element.get(formulation.name)
         if weight is None and formulation.cost is not None:
             weight = self.per_element.get(formulation.cost)
@@ -293,9 +293,11 @@ def read_weights(path: str) -> Weights:
         content = Path(path).read_bytes()
         values = tomllib.loads(content.decode("utf-8"))
     except (OSError, UnicodeDecodeError, ValueError, RecursionError) as error:
+        is_binary = isinstance(error, UnicodeDecodeError)
         reason = getattr(error, "strerror", None) or error
+        reason = "binary data" if is_binary else reason
         raise ConfigurationError(
-            f"{path}: cannot be read ({reason}), a TOML file of weights was expected"
+            f"{path}: cannot be read ({reason}), a TOML file of weights was expected; d2rpick calibrate writes one"
         ) from None
     unknown = [key for key in values if key not in _KEYS]
     if unknown:

@@ -72,8 +72,8 @@ class PartSet(NamedTuple):
     longest flight [time], and ``rigid_fraction`` its fraction of the record [-]. ``angle_error`` is the rotation error
     of a body at td [degrees]; if ``position_is_lower_bound`` is True, this error and the position error may be larger.
     ``moving`` contains the parts that move relative to the others; ``apart`` is True if some of them separate from the
-    body to which they are to belong. ``decision`` is the verdict on the window, and ``cost_reason`` the reason why the
-    saving is unknown.
+    body to which they are to belong. ``decision`` is the verdict on the window in ``situation``, and ``cost_reason``
+    the reason why the saving is unknown.
     """
 
     name: str
@@ -99,6 +99,7 @@ class PartSet(NamedTuple):
     reasons: tuple[str, ...] = ()
     recommended: bool = False
     decision: Decision | None = None
+    situation: Situation | None = None
     cost_reason: str | None = None
 
     @property
@@ -423,6 +424,7 @@ class _SetComparison:
         time = reference.history.time
         part_set = part_set._replace(
             window=(tr, td),
+            situation=situation,
             rigid_fraction=(td - tr) / float(time[-1] - time[0]),
             decision=decision,
         )

@@ -514,7 +514,10 @@ def _find_agreed_tr(judged: Sequence[StudyRow], keeping: Samples) -> float | Non
 def _find_least_loss(
     judged: Sequence[StudyRow], shared: Samples
 ) -> tuple[float, float]:
-    """Return the first interval of the shared windows whose largest loss exceeds the minimum by at most 0.02."""
+    """Return the first interval of the shared windows in which a common tr loses least, within 0.02.
+
+    The loss at a common tr is the largest increase of the error over all runs, compared with the own tr of each run.
+    """
     profiles = [row.profile for row in judged if row.profile is not None]
     times = np.unique(
         np.concatenate([shared.ravel(), *(profile[0] for profile in profiles)])

@@ -61,6 +61,9 @@ def find_longest_flight(
         if held:
             reason = held
             cure = "name parts that nothing holds"
+        elif not history.energy.any():
+            reason = f"{_NO_FLIGHT}: the energy is 0 in all states"
+            cure = "choose the internal energy with `energy`"
         elif settings.after is not None:
             cure = "give `td`"
         elif not history.complete:
@@ -81,6 +84,18 @@ def find_longest_flight(
     )
     latest = compute_last_td(end, find_margin(history, longest, settings).time)
     return start, latest if longest.source == "energy" and latest > start else end
+
+
+def has_other_flights(history: History, settings: Settings, td: float) -> bool:
+    """Return True if a flight that does not contain ``td`` [time] is long enough for a useful rigid window."""
+    for flight in find_flights(history, settings):
+        start, end = flight.within(history.time)
+        if start <= td <= end:
+            continue
+        latest = compute_last_td(end, find_margin(history, flight, settings).time)
+        if latest - start >= MIN_RIGID * history.duration:
+            return True
+    return False
 
 
 def compute_last_td(end: float, margin: float) -> float:

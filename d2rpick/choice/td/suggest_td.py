@@ -418,10 +418,12 @@ def _choose_by_residual(
     pairs = pairs or _select_acceptable(map(look, window))
     # The level error of a pair whose deformations are unknown is no residual, so the two are not compared.
     pairs = [pair for pair in pairs if pair[1].residual is not None] or pairs
+    # The smallest residual may have the widest error band.
+    good = [pair for pair in pairs if _is_good(pair[1])] or pairs
     limit = min(
-        (best.error for _, best in pairs), default=0.0
+        (best.error for _, best in good), default=0.0
     ) + get_limit_of_like_quality(situation)
-    alike = [pair for pair in pairs if pair[1].error <= limit]
+    alike = [pair for pair in good if pair[1].error <= limit]
     return _get_td(_find_longest(_select_surest(alike))), _get_td(_find_longest(pairs))
 
 

@@ -13,6 +13,7 @@ from d2rpick.base.errors import Caution, RangeError
 from d2rpick.choice.answers import (
     PairSuggestion,
     decide_with_better_pair,
+    refuse_switched_flight,
     suggest_at,
     suggest_in_run,
 )
@@ -271,6 +272,9 @@ def explore_run(
         for offer in _mark_unbeaten([*make_offers(situations, peaks)])
     ]
     requested = next((offer for offer in offers if offer.td == td), None)
+    if requested:
+        # The chosen pair was judged in its own flight, which may be another one.
+        refuse_switched_flight(reference, requested.situation)
     situation = fully(known_best.td)
     # Before the first td of the flight, the states are too few to show a vibration.
     warned = suggestion.situation

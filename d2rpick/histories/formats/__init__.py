@@ -20,10 +20,11 @@ FAMILIES: Final = ("d3thdt", "d3plot")
 class Listed(NamedTuple):
     """A file format, described without importing its reader ``module``.
 
-    The regular expression ``hint`` finds a match in the first bytes of each file of the format. ``files`` matches the
-    file names that the ``solver`` uses; its group ``root`` is the name of the run if the solver puts it into the file
-    name. Only solver files have an energy balance and common times of all columns. Files of a format without a
-    ``solver`` contain columns that a user has named.
+    The regular expression ``hint`` finds a match in the first bytes of each file of the format; the reader is imported
+    and its ``recognises`` called only for files in which ``hint`` finds a match. ``files`` matches the file names that
+    the ``solver`` uses; its group ``root`` is the name of the run if the solver puts it into the file name. Only solver
+    files have an energy balance and common times of all columns. Files of a format without a ``solver`` contain columns
+    that a user has named.
     """
 
     module: str

@@ -196,7 +196,7 @@ def _view_rows(data: Content, first: int, stride: int, count: int, size: int) ->
 
 
 def _find_differing_bits(rows: Bytes, example: Bytes) -> Bytes:
-    """Return the bits in which any row differs from the example, shape (size,)."""
+    """Return a bit mask of the bits in which at least one row (count, size) differs from ``example``, both (size,)."""
     count, size = rows.shape
     if count % _FOLD == 0 and rows.flags.c_contiguous:
         rows = rows.reshape(count // _FOLD, _FOLD * size)

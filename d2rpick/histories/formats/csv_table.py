@@ -9,7 +9,12 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.base.caching import cached_property
-from d2rpick.base.errors import FormatError, give_if_written, list_names
+from d2rpick.base.errors import (
+    EnergyChoiceError,
+    FormatError,
+    give_if_written,
+    list_names,
+)
 from d2rpick.histories.database import Database
 from d2rpick.histories.formats.cells import (
     has_number,
@@ -168,9 +173,11 @@ def find_internal_energy(
     if len(energies) == 1:
         return energies[0]
     count = f"{len(energies)} columns are" if energies else "no column is"
-    menu = _list_columns(layout, energies or candidates)
-    raise FormatError(
-        f"{source}: {count} named like an internal energy; choose with `energy`: {menu}"
+    choices = energies or candidates
+    menu = _list_columns(layout, choices)
+    raise EnergyChoiceError(
+        f"{source}: {count} named like an internal energy; choose with `energy`: {menu}",
+        tuple(str(column + 1) for column in choices),
     )
 
 
@@ -202,7 +209,7 @@ def _note_unsure_columns(layout: Layout) -> str:
 
 
 def _list_columns(layout: Layout, columns: Sequence[int]) -> str:
-    """Return numbers and names of the columns that the user can choose."""
+    """List the columns from which the user can choose, with their numbers and names."""
     return list_names([f"{column + 1} {layout.name(column)!r}" for column in columns])
 
 

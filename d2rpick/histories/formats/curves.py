@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.base.caching import cached_property
-from d2rpick.base.errors import FormatError, list_names
+from d2rpick.base.errors import EnergyChoiceError, FormatError, list_names
 from d2rpick.histories.database import Database
 from d2rpick.histories.formats.cells import parse_cell
 from d2rpick.histories.formats.layout import number_duplicates
@@ -178,7 +178,9 @@ class Curves(Database):
         if len(fitting) != 1:
             count = f"{len(fitting)} curves are" if fitting else "no curve is"
             problem = f"{self.source}: {count} named like an internal energy"
-            raise FormatError(f"{problem}; choose with `energy`: {self._menu()}")
+            message = f"{problem}; choose with `energy`: {self._menu()}"
+            numbers = tuple(str(number + 1) for number in range(len(self.channels)))
+            raise EnergyChoiceError(message, numbers)
         if len(self.channels) == 1:
             refuse_other_quantity(self.channels[0], self.source)
         return self.channels[fitting[0]]

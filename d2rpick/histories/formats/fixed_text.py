@@ -240,7 +240,7 @@ class Blocks(Database):
         )
 
     def _refuse_odd(self, values: Samples, names: Sequence[Hashable]) -> None:
-        """Raise FormatError with the line of the first value of ``values`` (states, len(names)) that is no number."""
+        """Raise FormatError with the line of the first of ``values`` (states, len(names)) that is not a number."""
         odd = np.isnan(values)
         if not odd.any():
             return

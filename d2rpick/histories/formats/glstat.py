@@ -50,12 +50,12 @@ _CHANGING: Final = re.compile(
 )
 
 
-def recognises(data: bytes) -> bool:
-    """Return True if ``data``, the start of a file, looks like a glstat; a header without states is sufficient."""
-    if b"\n" + _START in data or data.startswith(_START):
+def recognises(head: bytes) -> bool:
+    """Return True if ``head``, the start of a file, looks like a glstat; a header without states is sufficient."""
+    if b"\n" + _START in head or head.startswith(_START):
         return True
-    _, version, begin = read_head_of_listing(data)
-    states = data[begin:].strip()
+    _, version, begin = read_head_of_listing(head)
+    states = head[begin:].strip()
     return bool(version) and (not states or states.startswith(_CONTROL.strip()))
 
 

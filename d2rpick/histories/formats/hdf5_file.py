@@ -63,9 +63,9 @@ _SLOWEST: Final = 100_000  # Slowest expected reading speed [bytes/s].
 _USER_BLOCK: Final = 512  # Number of bytes that MATLAB writes before the HDF5 content.
 
 
-def recognises(data: bytes) -> bool:
-    """Return True if ``data`` is the start of an HDF5 file; MATLAB writes 512 bytes before the signature."""
-    return SIGNATURE in (data[:8], data[512:520])
+def recognises(head: bytes) -> bool:
+    """Return True if ``head`` is the start of an HDF5 file; MATLAB writes 512 bytes before the signature."""
+    return SIGNATURE in (head[:8], head[512:520])
 
 
 def open_legs(sources: Sequence[Source], selection: Selection) -> list[Database]:

@@ -178,7 +178,7 @@ def _split_rows(
 
 
 def _split_header(line: str, separator: str | None, columns: int) -> list[str]:
-    """Split a header line into names, which may contain single spaces. A line of another form is one title."""
+    """Split a header line into names, which may contain single spaces; treat any other line as one title."""
     if separator is not None:
         return split_cells(line, separator)
     wide = [cell.strip('"') for cell in re.split(r"\s{2,}|\t", line.strip())]

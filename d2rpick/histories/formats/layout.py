@@ -18,6 +18,7 @@ from d2rpick.histories.formats.cells import (
     is_word,
     parse_cell,
     split_cells,
+    split_columns_of_numbers,
 )
 from d2rpick.histories.formats.header import Header, quote_start, read_header
 from d2rpick.histories.formats.text import HEAD, Text
@@ -38,6 +39,7 @@ _FORMS = (
 
 # Pattern of the line ``sep=;`` that spreadsheets write above a table; a separator cannot be part of a number.
 _SEP_LINE = re.compile(r'(?i:sep=)(?![\w.+"-])([!-~])')
+_DIGIT = re.compile(r"\d", re.ASCII)
 _DECIMAL_PART = re.compile(r"[+-]?0\d+")
 
 # Number of lines that the first attempt searches for the first row.
@@ -206,10 +208,15 @@ def _find_rows(
         forms = [(separator, decimal) for decimal in ".," if separator != decimal]
     else:
         forms = _FORMS
+    half = len(sample) // 2
+    # A row has a number, so a line without a digit is not a row.
+    sample = [(i, line) for i, line in sample if _DIGIT.search(line)]
     for only_numbers in (False, True):
         best = None
-        best_count = 0 if only_numbers else len(sample) // 2
+        best_count = 0 if only_numbers else half
         for sign, decimal in forms:
+            if best_count == len(sample):
+                break  # No form has more rows.
             if sign and not any(sign in line for _, line in sample):
                 continue
             cells = [(i, split_cells(line, sign)) for i, line in sample]
@@ -224,16 +231,13 @@ def _find_rows(
             if with_groups and not thousands:
                 continue
             form = Layout(sign, decimal, 0, 0, thousands=thousands)
-            kinds = [
-                (i, row, _find_numbers_in_row(row, form, only_numbers))
-                for i, row in cells
-            ]
-            kinds = [(i, row, kind) for i, row, kind in kinds if kind]
-            if not kinds:
+            kinds = _find_numbers(sample, cells, form, only_numbers)
+            counts = Counter(kind for kind in kinds if kind)
+            if not counts:
                 continue
-            counts = Counter(kind for _, _, kind in kinds)
             common, count = max(counts.items(), key=itemgetter(1))
-            alike = [(i, row) for i, row, kind in kinds if _is_like(kind, common)]
+            rows = zip(cells, kinds, strict=True)
+            alike = [row for row, kind in rows if _is_like(kind, common)]
             # If the last cell of every row is empty, every row ends with a separator.
             is_closed = not any(row[-1] for _, row in alike)
             columns = len(common) - is_closed
@@ -245,10 +249,24 @@ def _find_rows(
     return None
 
 
+def _find_numbers(
+    sample: Sequence[tuple[int, str]],
+    cells: Sequence[tuple[int, list[str]]],
+    form: Layout,
+    only_numbers: bool,
+) -> Sequence[tuple[bool, ...]]:
+    """Return the result of `_find_numbers_in_row` for each line; lines of plain numbers are recognised all at once."""
+    columns = len(cells[0][1])
+    lines = [line for _, line in sample]
+    if split_columns_of_numbers(lines, form.separator, form.decimal, columns):
+        return [(True,) * columns] * len(cells)
+    return [_find_numbers_in_row(row, form, only_numbers) for _, row in cells]
+
+
 def _find_numbers_in_row(
     cells: list[str], form: Layout, only_numbers: bool
 ) -> tuple[bool, ...]:
-    """Return, for each cell of a row, whether it is a number or marks a missing one; empty if the line is no row."""
+    """Return for each cell of a row whether it is a number or marks a missing value; empty if there is no row."""
     # Most lines have only one cell here, because most of the separators that are tried are wrong.
     if len(cells) < 2:
         return ()

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
     from d2rpick.histories.source import Source
 
-QUANTITIES: Final[Mapping[str, str]] = {
+_COMPONENTS: Final[Mapping[str, str]] = {
     "internal_energy": "inten",
     "kinetic_energy": "kinen",
     "x_momentum": "x-mom",
@@ -76,11 +76,11 @@ _CHANGING: Final = re.compile(rb" {0,12}[+-]?\d[\d+-]*")
 _OVERFLOW: Final = re.compile(rb"\*+ +inten=")
 
 
-def recognises(data: bytes) -> bool:
-    """Return True if ``data``, the start of a file, looks like a matsum; a legend without states is sufficient."""
-    if b"\n mat.#=" in data:
-        return b"\n" + _START in data
-    _, legend, states = data.partition(b"\n{END LEGEND}")
+def recognises(head: bytes) -> bool:
+    """Return True if ``head``, the start of a file, looks like a matsum; a legend without states is sufficient."""
+    if b"\n mat.#=" in head:
+        return b"\n" + _START in head
+    _, legend, states = head.partition(b"\n{END LEGEND}")
     return bool(legend) and not states.strip()
 
 
@@ -127,16 +127,16 @@ class Matsum(Blocks):
         self.notes += self._remarks(present)
 
     def part_channel(self, quantity: str, ids: Sequence[int]) -> Samples:
-        """Return one of ``QUANTITIES`` for the parts ``ids``, shape (n, len(ids)).
+        """Return one of ``_COMPONENTS`` for the parts ``ids``, shape (n, len(ids)).
 
         Raises
         ------
         FormatError
             If the quantity or a part does not occur exactly once in every state.
         """
-        if quantity not in QUANTITIES:
+        if quantity not in _COMPONENTS:
             raise FormatError(
-                f"{self.source}: no quantity {quantity!r} in a matsum, only {', '.join(QUANTITIES)}"
+                f"{self.source}: no quantity {quantity!r} in a matsum, only {', '.join(_COMPONENTS)}"
             )
         part_ids = {part.id for part in self.parts}
         missing = [id_ for id_ in ids if id_ not in part_ids]
@@ -150,7 +150,7 @@ class Matsum(Blocks):
             # A request for one component is usually followed by requests for the others.
             together = _AXES if quantity in _AXES else (quantity,)
             names = [
-                (id_, QUANTITIES[component]) for id_ in ids for component in together
+                (id_, _COMPONENTS[component]) for id_ in ids for component in together
             ]
             values = self.numbers(names, anchors=[(id_, _MAT) for id_, _ in names])
             self._together = {

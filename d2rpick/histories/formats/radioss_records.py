@@ -194,7 +194,7 @@ class _TextRecords(Records):
         return values
 
     def digits(self, times: Samples) -> int:
-        """Return the digits of single precision if all times are single-precision numbers, else those of the text."""
+        """Return the number of significant digits of times: that of single precision if it represents all of them."""
         last = times[-_JUDGED:]
         with np.errstate(over="ignore"):
             singles = last.astype(np.float32).tolist()

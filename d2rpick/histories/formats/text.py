@@ -15,7 +15,7 @@ from d2rpick.histories.content import Content, OnDisk, count_line_number
 from d2rpick.histories.history import EXACT, Precision, Samples
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     from d2rpick.histories.source import Source
 
@@ -30,6 +30,8 @@ _PARTS = re.compile(r"[+-]?(\d*+)\.?+(\d*+)(?:[eEdD]([+-]?\d++))?")
 # Number of significant digits that preserve every double.
 _LONGEST = 17
 _PLAIN = r"[+-]?(?:0|[1-9]\d+)\.\d+"
+# Table that replaces each digit other than 0 by 9.
+_SHAPE_OF_DIGITS = str.maketrans("12345678", "99999999")
 # A format with at least this many digits is treated as lossless, because 15 digits survive conversion to a double.
 _FULL = 15
 
@@ -72,7 +74,8 @@ class Text:
 
     @cached_property
     def _first(self) -> list[str]:
-        return list(islice(self.lines(0), self.top + 1))
+        lines = chain.from_iterable(map(self.rows, self.pieces(0)))
+        return list(islice(lines, self.top + 1))
 
     def place(self, line: int) -> int:
         """Return the offset of a line, counted from 0 [bytes]; the end of the last line if there are fewer lines."""
@@ -181,7 +184,7 @@ def _read_plain_text(source: Source, piece: int) -> tuple[Content, str]:
 
 
 def _is_plain(data: bytes) -> bool:
-    """Return True if data are ASCII text without carriage returns and null characters."""
+    """Return True if data are ASCII text without carriage returns or null characters."""
     return data.isascii() and b"\r" not in data and b"\0" not in data
 
 
@@ -219,15 +222,16 @@ def find_precisions(
     >>> find_precisions(["0.001", "0.0025", "0.0041"], ["1.25000e+01"], np.array([0.001, 0.0025, 0.0041]))
     (Precision(digits=6, decimals=None), Precision(digits=6, decimals=None))
     """
+    shapes_of_time, shapes_of_energy = _find_shapes(time), _find_shapes(energy)
     digits = 0
-    for field in (*energy, *time):
-        if _count_at_most(field) > digits:
-            digits = max(digits, _count_significant_digits(field))
+    for shape in shapes_of_time | shapes_of_energy:
+        if _count_at_most(shape) > digits:
+            digits = max(digits, _count_significant_digits(shape))
         if digits >= _FULL:
             return EXACT, EXACT
     general = Precision(digits=max(digits, 1))
-    time_decimals = _find_fixed_decimals(time)
-    energy_decimals = _find_fixed_decimals(energy)
+    time_decimals = _find_fixed_decimals(shapes_of_time)
+    energy_decimals = _find_fixed_decimals(shapes_of_energy)
     time_fixed = time_decimals and not _is_finer_than_its_grid(time_decimals, moments)
     time_precision = energy_precision = general
     if time_fixed:
@@ -287,6 +291,14 @@ def _count_at_most(field: str) -> int:
     return len(written) - ("." in written)
 
 
+def _find_shapes(fields: Sequence[str]) -> set[str]:
+    """Return the distinct fields after each digit other than 0 has been replaced by 9.
+
+    Only the digits and zeros of a field decide its precision, and a column has far fewer such shapes than fields.
+    """
+    return {*"\n".join(fields).translate(_SHAPE_OF_DIGITS).split("\n")}
+
+
 def _count_significant_digits(field: str) -> int:
     """Return the number of significant digits of a field; 0 if the field is not a number."""
     parts = _PARTS.fullmatch(field)
@@ -298,11 +310,13 @@ def _count_significant_digits(field: str) -> int:
     return len(digits.lstrip("0"))
 
 
-def _find_fixed_decimals(fields: Sequence[str]) -> int | None:
-    """Return the number of decimals that all fields have in common; None if fields differ or have an exponent."""
-    decimals = _decimals(fields[0]) if fields else 0
-    are_alike = decimals > 0 and all(_decimals(field) == decimals for field in fields)
-    return decimals if are_alike else None
+def _find_fixed_decimals(shapes: Iterable[str]) -> int | None:
+    """Return the number of decimals that all shapes have in common; None if they differ or have an exponent."""
+    lengths = {shape.replace("0", "9") for shape in shapes}
+    numbers_of_decimals = {*map(_decimals, lengths)}
+    if len(numbers_of_decimals) != 1:
+        return None
+    return numbers_of_decimals.pop() or None
 
 
 def _decimals(field: str) -> int:

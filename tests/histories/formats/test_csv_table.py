@@ -640,6 +640,12 @@ def test_extreme_energies_are_read_without_a_warning(energy: float) -> None:
             Precision(digits=5),
             Precision(digits=5, decimals=3),
         ),
+        # Zeros within a number are digits like any other, but leading zeros are not significant.
+        (
+            "0.00,0.00100\n0.07,10.02030\n0.12,0.00004\n",
+            Precision(digits=7, decimals=2),
+            Precision(digits=7, decimals=5),
+        ),
         ("0,0.333333333333333315\n0.13,12.125\n0.2,1.000\n", EXACT, EXACT),
     ],
 )
