@@ -487,7 +487,8 @@ def _limit_to_level(
             )
         else:
             damped = None
-        if history.parts is not None:
+        # A load acts on the whole model, so the energy of single parts does not show it.
+        if history.parts is not None or history.evidence.not_chosen:
             energy = np.interp(time, balance.time, balance.internal)
     start = find_settled_time(
         time,

@@ -23,6 +23,7 @@ from d2rpick.choice.pair.quality import (
     MOST_WORTH_OF_FAIR,
     MOST_WORTH_OF_GOOD,
     grade_pair,
+    refuse_error,
 )
 from d2rpick.vibration.measures import wrong_sign
 
@@ -148,9 +149,6 @@ class Decision(NamedTuple):
         """Reason for the verdict."""
         if self.objections:
             return "; ".join(self.objections)
-        if self.grade == POOR and self.quality.grade != POOR:
-            # The error makes the pair inadmissible, however little it affects the next contact.
-            return "; ".join(self.quality.alone.reasons)
         if self.at_rest and not self.quality.reasons:
             return "nothing vibrates in the flight up to td"
         reasons = "; ".join(self.quality.reasons)
@@ -165,9 +163,6 @@ class Decision(NamedTuple):
         """Reason for a verdict other than "use", without numbers, so that several pairs can share the reason."""
         if self.objections:
             return "; ".join(self.objections)
-        if self.grade == POOR and self.quality.grade != POOR:
-            causes = self.quality.alone.causes
-            return "; ".join(cause.general_reason for cause in causes)
         reasons = "; ".join(cause.general_reason for cause in self.quality.causes)
         if self.is_limited_by_raised_grade:
             limit = (
@@ -285,22 +280,23 @@ def decide(
     candidate: Candidate,
     *,
     objections: Sequence[str] = (),
+    errors: Sequence[str] = (),
     better: Pair | None = None,
     cure_of_objections: str = CHOOSE_ANOTHER,
     best_of: tuple[float, float] | None = None,
-    is_admissible: bool = True,
     best_residual: float | None = None,
 ) -> Decision:
     """Return the verdict on a tr, which any of the ``objections`` makes inadmissible; ``better`` is a better pair.
 
-    ``is_admissible`` is False for a pair without ``objections`` that is inadmissible only because its residual is too
-    large. ``best_residual`` is the residual of the best tr at this td [-]: if it is clearly smaller, the verdict blames
-    tr. If there is no better pair, ``cure_of_objections`` is the advice on the objections. ``best_of`` is the range of
-    td in which the pair is the best [time], if all td of the range were compared.
+    ``errors`` are further objections, which repeat that the residual is too large. ``best_residual`` is the residual of
+    the best tr at this td [-]: if it is clearly smaller, the verdict blames tr. If there is no better pair,
+    ``cure_of_objections`` is the advice on the objections. ``best_of`` is the range of td in which the pair is the best
+    [time], if all td of the range were compared.
     """
     quality = grade_pair(situation, candidate, best_residual)
+    quality = refuse_error(quality, errors)
     return Decision(
-        grade=quality.grade if is_admissible and not objections else POOR,
+        grade=POOR if errors or objections else quality.grade,
         quality=quality,
         objections=tuple(objections),
         at_rest=situation.at_rest,
