@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.names import Part
 
 # Why no flight is found, if the momentum excludes every flight.
-NEVER_FLIES: Final = "the momentum shows no free flight at any time"
+NEVER_FLIES: Final = f"the momentum shows no free flight that lasts at least {SHORTEST:.0%} of the record"
 _SURE: Final = ("given", "momentum", "oscillator")
 BY_ENERGIES: Final = ("contact-energy", "energy-balance")
 # Largest work of a load on the parts in a flight, relative to their internal energy [-].
@@ -280,7 +280,7 @@ def find_all_seen(history: History) -> tuple[tuple[str, FreeFlight], ...]:
 
 
 def denies_every_flight(history: History) -> bool:
-    """Return True if the momentum shows that the parts, or the model, fly at no time of the record."""
+    """Return True if the momentum shows that the parts, or the model, have no long flight in the record."""
     return any(
         witness.source == "momentum" and witness.decisive and not witness.flights()
         for witness in list_witnesses(history)

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 _FAMILY: Final = r"(?i:(?P<first>(?:.*\.)?d3(?:plot|thdt|part))(?P<number>\d{2,})?)"
 # Pattern of the file names of force listings, which are read in addition to files that contain energies.
 _FORCES: Final = r"(?i:r[cw]forc(?:\.gz)?)"
+# Name of an LS-DYNA database that begins with the name of its job, such as job7.glstat.
+_OF_JOB: Final = r"(?i:(?P<job>.+)\.(?:glstat|matsum|binout[\d%]*|d3plot\d*|d3thdt\d*|r[cw]forc)(?:\.gz)?)"
 _GZIP = b"\x1f\x8b"
 # Number of packed bytes that are unpacked at a time; they unpack to at most 68 MB.
 _BLOCK = 1 << 16
@@ -214,6 +216,11 @@ def _list_databases(folder: Path) -> list[str]:
     """Return the solver databases in a folder; raise FormatError unless all belong to one run."""
     runs_of_files = {file: _find_run(file) for file in sorted(folder.iterdir())}
     databases = {file: run for file, run in runs_of_files.items() if run}
+    of_no_job = {
+        file: run for file, run in databases.items() if not _find_job(file.name)
+    }
+    # Files that a user has named, such as old.glstat, may lie beside the files of the solver.
+    databases = of_no_job or databases
     if not databases:
         inner = any(map(_find_run, folder.glob("*/*")))
         cure = "give the file"
@@ -256,17 +263,25 @@ def _read_head(file: Path) -> bytes:
 
 def _find_run(file: Path) -> str:
     """Return the run name that the file name of a solver database contains; empty for any other file."""
-    if re.fullmatch(_FORCES, file.name) and file.is_file():
-        return "one of LS-DYNA"
+    job = _find_job(file.name)
+    name = file.name.removeprefix(f"{job}.")
+    if re.fullmatch(_FORCES, name) and file.is_file():
+        return job or "one of LS-DYNA"
     for listed in READERS.values():
         if not listed.files:
             continue
-        match = re.fullmatch(rf"{listed.files}(?:\.gz)?", file.name)
+        match = re.fullmatch(rf"{listed.files}(?:\.gz)?", name)
         if match and file.is_file():
             if match.groupdict():
                 return f"{match['root']}T01"
-            return f"one of {listed.solver}"
+            return job or f"one of {listed.solver}"
     return ""
+
+
+def _find_job(name: str) -> str:
+    """Return the job that LS-DYNA puts before the name of a database (``jobid=`` of its command line), or nothing."""
+    match = re.fullmatch(_OF_JOB, name)
+    return match["job"] if match else ""
 
 
 def _read_stdin() -> bytes:

@@ -163,6 +163,7 @@ def test_a_glob_takes_what_has_such_a_name() -> None:
             r"run: this folder holds several runs \(aT01, bT01\)",
         ),
         (("run/aT01", "run/binout"), r"several runs \(aT01, one of LS-DYNA\)"),
+        (("run/job7.glstat", "run/job8.matsum"), r"several runs \(job7, job8\)"),
         (
             ("run/d3dump01",),
             "run: no glstat, matsum, binout, d3plot or T01 in this folder; give the file",
@@ -238,3 +239,19 @@ def test_a_radioss_history_has_a_next_leg_only_if_the_next_number_exists(
         if has_next_leg(str(tmp_path / name))
     ]
     assert followed == ["runT01", "runT09.gz"]
+
+
+@pytest.mark.usefixtures("here")
+def test_the_names_of_a_job_are_those_of_its_run() -> None:
+    """``ls-dyna i=main.k jobid=job7`` writes job7.glstat, job7.matsum, job7.binout0000 and job7.d3plot."""
+    databases = names(
+        "run/job7.binout0000", "run/job7.glstat", "run/job7.matsum", "run/job7.rcforc"
+    )
+    names("run/job7.k", "run/job7.messag")
+    assert sorted(expand(["run"])) == sorted(databases)
+
+
+@pytest.mark.usefixtures("here")
+def test_a_copy_with_a_name_of_its_own_beside_the_files_of_a_run_is_not_read() -> None:
+    names("run/glstat", "run/old.glstat")
+    assert expand(["run"]) == ("run/glstat",)

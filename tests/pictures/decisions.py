@@ -76,10 +76,12 @@ def saving() -> Figure:
         (0.9, 3.0, REFERENCE, "--"),
     ):
         time = 1 - rigid * (1 - (1 - share) / ratio)
-        name = f"parts take {share:.0%} of the cost, time step × {ratio:g} while rigid"
+        name = (
+            f"parts take {share:.0%} of the CPU time; time step × {ratio:g} while rigid"
+        )
         draw_curve(axes, rigid * 100, time * 100, color, name, style)
     axes.set(xlim=(0, 100), ylim=(0, 100))
-    name_axes(axes, "rigid for this part of the simulated time [%]", "CPU time [%]")
+    name_axes(axes, "rigid fraction of the simulated time [%]", "CPU time [%]")
     show_names(axes, "lower left")
     return figure
 
@@ -147,7 +149,7 @@ def worth() -> Figure:
     axes.xaxis.set_major_formatter("{x:g}")
     name_axes(
         axes,
-        "energy of the vibration error, as a part of that of the contact [%]",
+        "energy of the vibration error / energy of the contact [%]",
         "largest difference [%]",
     )
     show_names(axes, "upper left")

@@ -46,9 +46,9 @@ def flight() -> Figure:
         shade(axes, 0.0861, 0.3793, "")
     energy.text(0.043, 350, "load", ha="center")
     energy.text(0.25, 350, "free flight", ha="center")
-    momentum.text(0.25, 1.6, "x constant, z falls by gravity alone", ha="center")
+    momentum.text(0.25, 1.6, "x constant; z changes only due to gravity", ha="center")
     mark_time(energy, 0.1434, "tr", 0.85)
-    mark_time(energy, 0.37, "", 0.85)
+    energy.axvline(0.37, color="black", linestyle="--", linewidth=0.8)
     energy.text(0.365, 180, "td", ha="right")
     energy.annotate(
         "contact", (0.3793, 45), (0.395, 200), arrowprops={"arrowstyle": "->"}
@@ -161,7 +161,7 @@ def residual() -> Figure:
         mark_time(axes, _PEAK * 1e3, "td", 0.85)
         mark_time(axes, 13.5867, "recommended tr", 0.93)
     name_axes(energy, "", "internal energy [J]")
-    name_axes(error, "time tr [ms]", "residual R")
+    name_axes(error, "time or tr [ms]", "residual R of tr")
     return figure
 
 
@@ -185,11 +185,11 @@ def out_of_place() -> Figure:
         (85, frozen[at_td]),
         arrowprops={"arrowstyle": "<->", "shrinkA": 0, "shrinkB": 0},
     )
-    axes.text(86.5, (body[at_td] + frozen[at_td]) / 2, "out of place", va="center")
+    axes.text(83.5, frozen[at_td] + 1.0, "position error", ha="right", va="center")
     mark_time(axes, 20, "tr", 0.93)
     mark_time(axes, 85, "td", 0.93)
     axes.set(xlim=(0, 100), ylim=(-6, 6))
-    name_axes(axes, "time [ms]", "body against the center of mass [mm]")
+    name_axes(axes, "time [ms]", "position relative to\ncentre of mass [mm]")
     show_names(axes, "lower left")
     return figure
 

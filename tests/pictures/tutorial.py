@@ -78,13 +78,13 @@ def fall_motion() -> Figure:
     for number, (start, end) in enumerate(FALL_FLIGHTS, 1):
         shade(height, start, end, f"flight {number}")
         shade(energy, start, end, "")
-    name_axes(height, "", "height of the center [m]")
+    name_axes(height, "", "height of the centre [m]")
     name_axes(energy, "time [s]", "internal energy [J]")
     height.set_ylim(0.4, 1.0)
     energy.annotate(
         "impact",
-        (0.245, 250),
-        (0.36, 250),
+        (0.25, 140),
+        (0.36, 200),
         arrowprops={"arrowstyle": "->"},
         va="center",
     )
