@@ -119,7 +119,13 @@ def _draw_panel(
     ):
         axes.margins(x=0.1, y=0.1)  # single runs, which would stand on the edges
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    if axes.get_legend_handles_labels()[0]:
+    if panel.shapes:
+        # Outlines fill the panel, so that a legend inside would hide some of them.
+        axes.margins(0.06)
+        axes.legend(
+            fontsize="x-small", loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=3
+        )
+    elif axes.get_legend_handles_labels()[0]:
         axes.legend(fontsize="x-small", loc="best")
 
 
