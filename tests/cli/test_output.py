@@ -11,8 +11,8 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -744,29 +744,3 @@ def test_a_td_that_was_given_is_answered_however_poor_and_none_is_chosen_so() ->
     for answered in (result, chosen):
         assert answered.stdout.startswith("do not use  tr = ")
     assert (result.exit_code, chosen.exit_code) == (0, 1)
-
-
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        ("suggest", "--td", "0.064"),
-        ("explore", "--steps", "4"),
-        ("verify", "--tr", "0.0135867", "--td", "0.0687534"),
-        ("plan",),
-    ],
-    ids=lambda arguments: arguments[0],
-)
-def test_every_answer_about_a_run_shows_that_it_is_computed(
-    arguments: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    shown: list[str] = []
-
-    @contextmanager
-    def note(say: Callable[[float], str], **_: object) -> Iterator[None]:
-        shown.append(say(0.0))
-        yield
-
-    monkeypatch.setattr(progress, "show_progress", note)
-    run(*arguments, ENERGY)
-    # The answer and, after it, the figure and the page.
-    assert shown.count("computing ... 0 s") == 2
