@@ -52,6 +52,12 @@ _USE_BEST: Final = (
 _AVOID_BEST: Final = "choose another flight, or make other parts rigid"
 # _USE_COMPARED: the advice that replaces _USE_BEST if a switched run has been compared.
 _USE_COMPARED: Final = "use this pair if only the motion matters"
+# _MORE_OFTEN: beginning of the advice on too few states per period.
+# _RUN_LONGER: advice if the flight goes on after the end of the record.
+_MORE_OFTEN: Final = "write the energies more often, at least"
+_RUN_LONGER: Final = (
+    ", where the record ends in the flight (a longer run may allow a better pair)"
+)
 # The worst case is shown if its residual exceeds the expected residual by more than this [-].
 _ALIKE: Final = 5e-3
 
@@ -83,6 +89,8 @@ class Decision(NamedTuple):
         Advice on how to remove the objections if there is no better pair.
     best_of : (float, float) or None
         Range of td in which this pair is the best [time]; None if not all td of the range were compared.
+    ends_in_flight : bool
+        True if the record ends before the next contact.
     is_compared : bool
         True if a finished switched run was compared with the reference run.
     """
@@ -98,6 +106,7 @@ class Decision(NamedTuple):
     better_level: float | None = None
     cure_of_objections: str = CHOOSE_ANOTHER
     best_of: tuple[float, float] | None = None
+    ends_in_flight: bool = False
     is_compared: bool = False
 
     @property
@@ -213,7 +222,9 @@ class Decision(NamedTuple):
             )
         if low > limits.high:
             return f" ({accepted}, so it will refuse that run by its mean energy)"
-        return f" ({accepted})"
+        return (
+            f" ({accepted}, so only the comparison shows whether it accepts that run)"
+        )
 
     @property
     def worst_case(self) -> str:
@@ -256,7 +267,8 @@ class Decision(NamedTuple):
         low, high = self.best_of
         usable = _USE_COMPARED if self.is_compared else _USE_BEST
         advice = _AVOID_BEST if self.grade == POOR else usable
-        return f"no clearly better pair was found for td from {low:.6g} to {high:.6g}: {advice}"
+        longer = _RUN_LONGER if self.ends_in_flight else ""
+        return f"no clearly better pair was found for td from {low:.6g} to {high:.6g}{longer}: {advice}"
 
 
 def join_cures(cures: Iterable[str]) -> str:
@@ -268,6 +280,9 @@ def join_cures(cures: Iterable[str]) -> str:
     'write more often, with more digits; give the deck'
     """
     listed = [*dict.fromkeys(cures)]
+    if any(cure.startswith("write the energies every") for cure in listed):
+        # A cure with an interval makes one without an interval superfluous.
+        listed = [cure for cure in listed if not cure.startswith(_MORE_OFTEN)]
     return "; ".join(
         cure
         for cure in listed
@@ -307,6 +322,8 @@ def decide(
         better_level=_compare_levels(situation, better),
         cure_of_objections=cure_of_objections,
         best_of=best_of,
+        ends_in_flight=situation.flight.start is not None
+        and situation.flight.end is None,
     )
 
 
