@@ -16,17 +16,19 @@ from d2rpick.choice.parts.cost import Weights, format_weights_as_toml
 from d2rpick.report.tables import make_positional
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
     from pathlib import Path
 
     import pandas as pd
     from matplotlib.figure import Figure
 
     from d2rpick.api.arguments import Parts, Time
+    from d2rpick.api.cards import Cards
     from d2rpick.api.choosing import Choosing
     from d2rpick.api.request import Request
     from d2rpick.api.runs import Run
     from d2rpick.base.spans import Times
+    from d2rpick.report.formats import RepeatedQuestion
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -40,6 +42,7 @@ class PartTable(Paged, sets_of_parts.Parts):
 
     run: Run
     command: tuple[str, ...]
+    question: RepeatedQuestion
     kind = "parts"
 
     def to_frame(self) -> pd.DataFrame:
@@ -66,6 +69,17 @@ class PartTable(Paged, sets_of_parts.Parts):
         return build_frame(
             list(map(SET.plain, self.sets)), SET.keys, source=list(self.run.sources)
         )
+
+    def page(
+        self,
+        command: Sequence[str],
+        judging: Sequence[str] = (),  # noqa: ARG002  other answers use the argument
+        cards: Cards | None = None,  # noqa: ARG002  other answers use the argument
+    ) -> str:
+        """Return the page with the next step; ``command`` is the command line that repeats it."""
+        from d2rpick.report.pages import parts_page
+
+        return parts_page(self, command, self.question)
 
     def plot(self) -> Figure:
         """Draw the flights, and the energies of those parts that have the largest energies."""
@@ -149,7 +163,13 @@ def compare_parts(
         for text in (f"--{name}", repr(time))
     ]
     command = ("parts", *window, *request.asking(), *make_positional(request.history))
-    return PartTable.of(table, run=run, command=command, cautions=name_deck(request))
+    return PartTable.of(
+        table,
+        run=run,
+        command=command,
+        question=request.repeat()._replace(times=tuple(window)),
+        cautions=name_deck(request),
+    )
 
 
 def check_times(tr: float | None, td: float | None) -> Times | float | None:

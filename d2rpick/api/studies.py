@@ -40,7 +40,9 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from d2rpick.api.arguments import Parts, Time
+    from d2rpick.api.cards import Cards
     from d2rpick.api.choosing import Choosing
+    from d2rpick.report.formats import RepeatedQuestion
 
 _FIRST: Final = b'{"source": '
 # First bytes of the summary line, which follows the rows.
@@ -58,7 +60,19 @@ class Study(Paged, core.StudyOfRuns):
     """
 
     command: tuple[str, ...]
+    question: RepeatedQuestion
     kind = "study"
+
+    def page(
+        self,
+        command: Sequence[str],
+        judging: Sequence[str] = (),  # noqa: ARG002  other answers use the argument
+        cards: Cards | None = None,  # noqa: ARG002  other answers use the argument
+    ) -> str:
+        """Return the page with the next step; ``command`` is the command line that repeats it."""
+        from d2rpick.report.pages import study_page
+
+        return study_page(self, command, self.question)
 
     def to_frame(self) -> pd.DataFrame:
         """Return a row per run and a column per key of ``runs`` in the JSON output; unknown values are NaN.
@@ -188,6 +202,7 @@ def answer_study(
     return Study.of(
         core.compare_rows(td, rows),
         command=("study", *times, *options, *make_positional(names)),
+        question=request.repeat()._replace(times=times, files=tuple(names)),
     )
 
 

@@ -27,6 +27,7 @@ from d2rpick.choice.health import (
     warn_about_health,
 )
 from d2rpick.choice.pair.grades import DO_NOT_USE, USE, USE_WITH_CARE
+from d2rpick.choice.pair.situation import FEWEST_STATES
 from d2rpick.choice.question import Reference, Settings
 from d2rpick.choice.switched.frozen import find_frozen_times
 from d2rpick.choice.switched.switched_run import (
@@ -53,8 +54,6 @@ if TYPE_CHECKING:
     from d2rpick.histories.run import OpenedRun
 
 
-# Smallest number of states from which times can be chosen.
-_FEWEST: Final = 3
 # Name of the Radioss output that contains the part momenta.
 _RADIOSS: Final = "/TH/PART with DEF, MASS and HE for all parts"
 _LS_DYNA: Final = "*DATABASE_MATSUM"
@@ -134,9 +133,9 @@ class Overview(NamedTuple):
         """Reason for the verdict."""
         if self.unjudged:
             return "; ".join(caution.message for caution in self.unjudged)
-        if not self.flights and self.states is not None and self.states < _FEWEST:
+        if not self.flights and self.states is not None and self.states < FEWEST_STATES:
             states = f"{self.states} state{'s' * (self.states != 1)}"
-            return f"the files contain {states}, at least {_FEWEST} were expected"
+            return f"the files contain {states}, at least {FEWEST_STATES} were expected"
         if not self.flights and not self.complete:
             return "the files end within a state, and no free flight is found in the part that was read"
         if not self.flights:

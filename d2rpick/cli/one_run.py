@@ -404,17 +404,8 @@ def parts(tr: float | None, td: float | None, request: Request, output: Output) 
     with open_with_output(request, output) as (run, output):
         answer = compare_parts(run, request, tr, td)
     output.notes(run.notes, answer.cautions)
-    question = request.repeat()._replace(times=options.write_times(tr=tr, td=td))
-
-    def write_page() -> str:
-        from d2rpick.report.pages import (
-            parts_page,  # Imported here to keep start-up fast.
-        )
-
-        return parts_page(answer, options.repeat_command(), question)
-
-    output.beside_answer(answer, write_page)
-    output.answer(answer, question=question)
+    output.beside_answer(answer, lambda: answer.page(options.repeat_command()))
+    output.answer(answer, question=answer.question)
     best = answer.recommended
     output.finish(objection=best is None or not best.is_usable)
 

@@ -136,24 +136,9 @@ def study(
     answer = answer_study(request, question, sources, rows)
     output.notes((), answer.cautions)
     output.spare(dict.fromkeys(stamp.name for row in rows for stamp in row.files))
-    times = options.write_times(td=td, td_window=td_window)
-    repeated = request.repeat()._replace(times=times, files=sources)
-    _print_study(answer, lines, repeated, output)
+    output.beside_answer(answer, lambda: answer.page(options.repeat_command()))
+    output.answer(answer, lines=lines, question=answer.question)
     _finish_study(answer, output)
-
-
-def _print_study(
-    answer: Study, lines: list[str], repeated: RepeatedQuestion, output: Output
-) -> None:
-    """Write the figure and the page of a study, then print the answer or, as ndjson, its ``lines``."""
-
-    def write_page() -> str:
-        from d2rpick.report.pages import study_page
-
-        return study_page(answer, options.repeat_command(), repeated)
-
-    output.beside_answer(answer, write_page)
-    output.answer(answer, lines=lines, question=repeated)
 
 
 def _finish_study(answer: Study, output: Output) -> None:

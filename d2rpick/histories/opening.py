@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Final, Protocol, cast
 import numpy as np
 
 from d2rpick.base.errors import FormatError, list_names
-from d2rpick.histories import force_listings
 from d2rpick.histories.content import Scattered
 from d2rpick.histories.database import Database, Legs
 from d2rpick.histories.formats import FAMILIES, READERS
@@ -51,6 +50,8 @@ _DEFAULT = Selection()
 _LONGEST_LEGEND: Final = 1 << 24
 # Largest number of unused tables that a note names.
 _MOST_TABLES: Final = 3
+# Each force listing contains one of these words, in upper or lower case.
+_WORDS_OF_FORCES: Final = (b"slave", b"master", b"surf", b"wall#")
 # Words that LS-DYNA prints above the states in a nodout.
 _NODOUT: Final = b"n o d a l   p r i n t   o u t"
 # Characters at the end of the name of a later file in a family.
@@ -347,9 +348,16 @@ def _sort_forces_last(
 
 def _is_force_listing(source: Source) -> bool:
     """Return True if a file is a force listing, which is never part of a family."""
-    return not isinstance(source.data, Scattered) and force_listings.recognises(
-        source.data[:_HEAD]
-    )
+    if isinstance(source.data, Scattered):
+        return False
+    head = source.data[:_HEAD]
+    in_lower_case = head.lower()
+    if not any(word in in_lower_case for word in _WORDS_OF_FORCES):
+        return False
+    # Imported here to keep start-up fast.
+    from d2rpick.histories.force_listings import recognises
+
+    return recognises(head)
 
 
 def _is_node_listing(source: Source) -> bool:
@@ -366,8 +374,13 @@ def _read_force_listings(
     sources: Sequence[Source],
 ) -> tuple[tuple[ContactForce, ...], tuple[str, ...]]:
     """Read the forces in files without energies; if the forces cannot be read, return a note."""
+    if not sources:
+        return (), ()
+    # Imported here to keep start-up fast.
+    from d2rpick.histories.force_listings import read_listed_forces
+
     try:
-        return force_listings.read_listed_forces(sources), ()
+        return read_listed_forces(sources), ()
     except FormatError as error:
         return (), (f"{error}; it was not used",)
 

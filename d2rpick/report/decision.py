@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from d2rpick.base.errors import make_printable
 from d2rpick.choice.pair.decision import join_cures
 from d2rpick.choice.pair.grades import DO_NOT_USE, GOOD
 from d2rpick.choice.pair.quality import MOST_WORTH_OF_FAIR
@@ -131,7 +132,8 @@ def format_outlook(decision: Decision) -> str:
 def format_rigid_time(best: Candidate, history: History) -> str:
     """Format the time for which the parts are rigid."""
     share = format_rigid_share(best.rigid_fraction, history)
-    return f"{best.rigid_time:.6g}, {share}"
+    unit = f" {make_printable(history.time_unit)}" if history.time_unit else ""
+    return f"{best.rigid_time:.6g}{unit}, {share}"
 
 
 def format_rigid_share(fraction: float, history: History) -> str:

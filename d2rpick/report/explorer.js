@@ -87,7 +87,7 @@
     },
     whole: {
       below: (chart) => {
-        band(chart, "flight", ...flight.view);
+        band(chart, "mark", ...flight.view);
         verified(chart);
       },
       above: (chart) => [row.tr, row.td].filter((time) => time !== null).forEach((time) => upright(chart, "switched", time)),
@@ -105,10 +105,19 @@
   const axis = (label, more) => ({
     stroke: () => colour("ink"), grid: { stroke: () => colour("line"), width: 1 },
     ticks: { stroke: () => colour("line"), width: 1 }, label, labelSize: 20, size: 32, font: "12px system-ui, sans-serif",
-    labelFont: "12px system-ui, sans-serif", ...more,
+    labelFont: "12px system-ui, sans-serif", values: numbers, ...more,
   });
-  const short = (value) => String(Number(value.toPrecision(6)));
-  const times = (x, values) => values.map(short);
+  // Times may have as many digits as 0.1234, so that their numbers need more room.
+  const time = (label) => axis(label, { space: 64 });
+  const short = (value) => {
+    if (value === null) return "";
+    const rounded = Number(value.toPrecision(6)), size = Math.abs(rounded);
+    const exponential = rounded.toExponential().replace("e+", "e");
+    return size >= 1e5 || (size > 0 && size < 1e-3) ? exponential : String(rounded);
+  };
+  const numbers = (x, values) => values.map(short);
+  // A logarithmic axis also has a mark at its end, which is no power of ten.
+  const powers = (x, values) => values.map((value) => value === null || Math.abs(Math.log10(value) % 1) > 1e-9 ? "" : short(value));
   const line = (name, more) => ({ stroke: () => colour(name), width: 1.5, points: { show: false }, ...more });
   const points = (name, size) => ({
     paths: () => null, points: { show: true, size, stroke: () => colour(name), fill: () => colour(name) },
@@ -118,24 +127,24 @@
   const kinds = {
     energy: () => ({
       height: 320, scales: { x: { time: false, range: flight.view }, y: { distr: flight.log ? 3 : 1, range: flight.heights } },
-      series: [{}, line("ink")], axes: [axis(flight.time, { values: times }), axis(flight.energy_label, { size: 62 })],
+      series: [{}, line("ink")], axes: [time(flight.time), axis(flight.energy_label, { size: 62, values: flight.log ? powers : numbers })],
       data: flight.energy,
     }),
     whole: () => ({
       height: 90, scales: { x: { time: false, range: (_, low, high) => [low, high] } },
       series: [{}, line("ink", { width: 1 })],
-      axes: [axis(null, { values: times }), axis(" ", { size: 62, values: () => [] })],
+      axes: [time(null), axis(" ", { size: 62, values: () => [] })],
       data: flight.whole,
     }),
     motion: () => ({
       height: 220, scales: { x: { time: false, range: flight.view }, y: { range: (_, low, high) => padded(low, high) } },
       series: [{}, line("ink"), line("switched")],
-      axes: [axis(flight.time, { values: times }), axis(flight.deformation_label, { size: 62 })], data: motion(),
+      axes: [time(flight.time), axis(flight.deformation_label, { size: 62 })], data: motion(),
     }),
     trade: () => ({
       height: 320, scales: { x: { time: false, range: (_, low, high) => padded(low, high) }, y: { range: (_, low, high) => [0, 1.08 * (high || 1)] } },
       series: [{}, points("soft", 4), { ...points("ink", 8), stroke: () => colour("ink") }],
-      axes: [axis(flight.saved, { values: times }), axis(flight.error, { size: 54 })], data: trade(),
+      axes: [axis(flight.saved), axis(flight.error, { size: 54 })], data: trade(),
     }),
   };
   const padded = (low, high) => {
@@ -203,12 +212,15 @@
       line?.classList.toggle("empty", !text || Boolean(above?.names.includes(line.firstChild.textContent)));
     });
     find('[data-value="verdict"]').className = row.text.badge ? `badge ${row.text.badge}` : "";
+    find(".earlier").setAttribute("aria-disabled", !findPeak(-1));
+    find(".later").setAttribute("aria-disabled", !findPeak(1));
     if (charts.motion) charts.motion.setData(motion(), false);
     follow();
   }
 
-  function follow() {
-    Object.values(charts).forEach((chart) => chart.redraw(false));
+  // Without again, the numbers of the axes stay as they are.
+  function follow(again = false) {
+    Object.values(charts).forEach((chart) => chart.redraw(false, again));
     handle.style.left = `${charts.energy.valToPos(row.td, "x")}px`;
   }
 
@@ -230,9 +242,15 @@
     show(flight.rows[Math.max(0, Math.min(flight.rows.length - 1, place))]);
   }
 
+  // The next peak of the energy that lies visibly apart from td.
+  function findPeak(direction) {
+    const apart = 0.005 * (flight.view[1] - flight.view[0]);
+    const peaks = flight.rows.filter((one) => one.peak && direction * (one.td - row.td) > apart);
+    return direction > 0 ? peaks[0] : peaks[peaks.length - 1];
+  }
+
   function toPeak(direction) {
-    const peaks = flight.rows.filter((one) => one.peak && direction * (one.td - row.td) > 0);
-    const next = direction > 0 ? peaks[0] : peaks[peaks.length - 1];
+    const next = findPeak(direction);
     if (next) show(next, spoken(next));
     else said.textContent = direction > 0 ? "No later peak of the energy." : "No earlier peak of the energy.";
   }
@@ -313,7 +331,7 @@
       const width = find(`.${name} .plot`).clientWidth;
       if (width && width !== chart.width) chart.setSize({ width, height: chart.height });
     });
-    follow();
+    follow(true);
   }).observe(section);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => Object.values(charts).forEach((chart) => chart.redraw()));
 })();

@@ -22,6 +22,7 @@ from d2rpick.report.page import (
     Markup,
     join,
     make_element,
+    name_section,
     read_resource,
 )
 from d2rpick.report.situation import label_deformation, label_energy
@@ -81,6 +82,10 @@ _LEVEL_OF_BEST: Final = "the best pair for this td: level at td; dashed: tr"
 _COLUMNS: Final = 480
 # Number of significant digits of a displayed difference.
 _READ: Final = 3
+# A difference of the rigid time is named from this fraction of the simulated time on [-].
+_VISIBLE_SHARE: Final = 5e-4
+# Title of the interactive section.
+_TITLE: Final = "What another td would cost"
 
 
 def read_styles() -> tuple[Markup, ...]:
@@ -139,6 +144,7 @@ def build_explorer(
     )
     unit = explored.trade_offs[0].situation.history.time_unit
     section = Template(section).substitute(
+        heading=_TITLE,
         kind="explorer" if judged is None else "explorer judged",
         level="level at td; dashed: tr" if judged is None else _LEVEL_OF_BEST,
         judged=_build_keys_of_judged(judged),
@@ -161,7 +167,8 @@ def build_explorer(
         "command": [f"{command_start} ", f" {command_end}"],
         **_list_marks_of_judged(judged, flights),
     }
-    return join([Markup(section), _build_data_element("explorer-data", data)])
+    content = join([Markup(section), _build_data_element("explorer-data", data)])
+    return name_section(content, _TITLE, "explorer", needs_script=True)
 
 
 def _build_keys_of_judged(judged: PairVerdict | None) -> Markup:
@@ -229,6 +236,8 @@ def _describe_flight(trade_off: TradeOff, *times: float) -> dict[str, Any]:
         if energy > scale.high
     ]
     cut = f"; cut at the top: {' and '.join(above)}" if above else ""
+    if situation.at_rest:
+        cut = ", on the scale of the whole run, because nothing vibrates in the flight"
     return {
         "caption": f"Internal energy in the flight{cut}",
         "time": f"time [{unit}]" if unit else "time (unit of the run)",
@@ -442,11 +451,12 @@ def _compare_offers(offer: Offer, start: Offer, unit: str) -> str:
     ]
     if offer.best and start.best:
         longer = offer.best.rigid_time - start.best.rigid_time
-        share = offer.best.rigid_fraction - start.best.rigid_fraction
-        comparisons.append(
-            f"rigid for {abs(longer):.{_READ}g}{unit} {'longer' if longer > 0 else 'less'}, "
-            f"{share:+.1%} of the simulated time"
-        )
+        share = abs(offer.best.rigid_fraction - start.best.rigid_fraction)
+        if share >= _VISIBLE_SHARE:
+            comparisons.append(
+                f"rigid for {abs(longer):.{_READ}g}{unit} {'longer' if longer > 0 else 'less'}, "
+                f"{share:.1%} of the simulated time"
+            )
     if offer.saving is not None and start.saving is not None:
         comparisons.append(
             f"saves {offer.saving:.1%} of the CPU time instead of {start.saving:.1%}"
@@ -456,7 +466,7 @@ def _compare_offers(offer: Offer, start: Offer, unit: str) -> str:
         and start.error is not None
         and (offer.basis == "energy") == (start.basis == "energy")
     ):
-        comparisons.append(
-            f"{_name_error([offer])} {format_measure(offer.error)} instead of {format_measure(start.error)}"
-        )
+        error, start_error = format_measure(offer.error), format_measure(start.error)
+        other = "" if error == start_error else f" instead of {start_error}"
+        comparisons.append(f"{_name_error([offer])} {error}{other}")
     return ", ".join(comparisons)

@@ -27,6 +27,9 @@ if TYPE_CHECKING:
 
 
 FORMATS = ("png", "svg", "pdf")
+# Meaning of the colours in all figures, and on the pages: black is the reference run, orange the switched run with tr,
+# td and the level at td, light blue a flight, blue another pair, and grey what has no verdict, e.g. rigid windows and
+# admissible times. Green, yellow and red stand only for verdicts.
 # Palette of Okabe and Ito, whose colours remain distinguishable to colour-blind readers.
 REFERENCE, SWITCHED, GOOD, FLIGHT, BETTER = (
     "#000000",
@@ -35,9 +38,10 @@ REFERENCE, SWITCHED, GOOD, FLIGHT, BETTER = (
     "#56b4e9",
     "#0072b2",
 )
-# Colour of things without a verdict, such as admissible times and rigid windows of a finished run.
-# Green, yellow and red are not used here, because these colours stand for verdicts.
 NEUTRAL: Final = "#595959"
+BAD: Final = "#b3261e"
+# Opacity of rigid windows that are shaded over the whole height of the axes [-].
+RIGID_OPACITY: Final = 0.2
 # Width of a figure in a file [inch].
 WIDTH: Final = 10.0
 # Largest width of the label of a switch time, as a fraction of the axes [-]; the key is True for a page.

@@ -18,6 +18,7 @@ from d2rpick.histories.samples import draw_outline
 from d2rpick.report import figures
 from d2rpick.report.decision import is_refused
 from d2rpick.report.figures import (
+    BAD,
     BETTER,
     GOOD,
     NEUTRAL,
@@ -66,14 +67,15 @@ _FEW: Final = 20
 _BAND: Final = 0.045
 # Time shown before and after the flights of a plan, as a fraction of the time that they span [-].
 _BEYOND_FLIGHTS: Final = 0.05
-# The label of a window contains its times if the window has at least this fraction of the shown time [-].
-_ROOM_FOR_TIMES: Final = 0.15
+# The label of a window contains its times if the window has at least this fraction of the shown time [-]; the key is
+# True for a page.
+_ROOM_FOR_TIMES: Final = {False: 0.15, True: 0.5}
 
 # Colours of the windows in a plan, keyed by verdict or state.
 _COLOURS: Final = {
     "use": GOOD,
     "use with care": "#e69f00",
-    "do not use": SWITCHED,
+    "do not use": BAD,
     "re-plan": "#cc79a7",
     "done": "#999999",
 }
@@ -99,15 +101,16 @@ _TRADE_HEIGHT, _TRADE_PANEL = 7.0, 1.9
 # Space before the first and after the last td, as a fraction of the axes [-], in which their marks fit.
 _AT_EDGE: Final = 0.02
 _ERRORS: Final = {True: "level shortfall", False: "residual"}
-# Palette of Okabe and Ito without yellow, which is hard to see on white. Dashes distinguish lines of the same colour.
+# Colours of the runs of a study, without those of tr, td, flights and verdicts: a palette by Paul Tol, whose colours
+# remain distinguishable to colour-blind readers. Dashes distinguish lines of the same colour.
 _RUN_COLOURS: Final = (
     REFERENCE,
-    SWITCHED,
-    GOOD,
-    "#0072b2",
-    "#cc79a7",
-    "#e69f00",
-    "#56b4e9",
+    BETTER,
+    "#882255",
+    "#44aa99",
+    "#aa4499",
+    "#999933",
+    "#332288",
 )
 _PATTERNS: Final = ("-", "--")
 # Largest number of runs that are all drawn in colour and named; of more runs, only outliers are coloured and named.
@@ -187,7 +190,7 @@ def _draw(
         panels[0].plot(
             computed.time,
             computed.energy,
-            color=BETTER,
+            color=SWITCHED,
             linewidth=1,
             label="switched run, as computed",
         )
@@ -319,7 +322,9 @@ def draw_plan(plan: RunPlan, *, page: bool = False) -> Figure:
             )
             figures.note(
                 axes,
-                _label_window(row.number, row.window, last - first),
+                _label_window(
+                    row.number, row.window, _ROOM_FOR_TIMES[page] * (last - first)
+                ),
                 (sum(row.window) / 2, 1 - _STRIP),
                 (0, -2),
                 ha="center",
@@ -354,10 +359,10 @@ def _show_flights(axes: Axes, plan: RunPlan) -> None:
     axes.set_xlim(max(first, start - beyond), min(last, end + beyond))
 
 
-def _label_window(number: int, window: Times, span: float) -> str:
-    """Return the number of a window, and its times if there is room for them."""
+def _label_window(number: int, window: Times, room: float) -> str:
+    """Return the number of a window, and its times if it is longer than the ``room`` that they need [time]."""
     tr, td = window
-    if td - tr < _ROOM_FOR_TIMES * span:
+    if td - tr < room:
         return str(number)
     return f"{number}: tr = {tr:.4g}, td = {td:.4g}"
 

@@ -9,7 +9,14 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 
 from d2rpick.models.box_motion import CURB_THICKNESS, Sled
-from d2rpick.report.figures import FLIGHT, GOOD, REFERENCE, SWITCHED, format_axes
+from d2rpick.report.figures import (
+    BETTER,
+    NEUTRAL,
+    REFERENCE,
+    RIGID_OPACITY,
+    SWITCHED,
+    format_axes,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -26,6 +33,9 @@ if TYPE_CHECKING:
 _OUTLINES = 8
 
 _SLED_LENGTH: Final = 1.6
+_SLED: Final = "#b0b8c0"  # Colour of the sled.
+# Second quantity next to one in the colour of the reference run; both belong to one run.
+_SECOND: Final = BETTER
 
 
 def draw_replay(motion: Trajectory, switched: Replay | None) -> Figure:
@@ -33,13 +43,13 @@ def draw_replay(motion: Trajectory, switched: Replay | None) -> Figure:
     figure = Figure(figsize=(9, 6.5), layout="constrained")
     upper, lower = figure.subplots(2, 1, sharex=True)
     upper.plot(motion.time, motion.state.z, color=REFERENCE, label="z, frame")
-    upper.plot(motion.time, motion.state.y, color=SWITCHED, label="y, suspended mass")
+    upper.plot(motion.time, motion.state.y, color=_SECOND, label="y, suspended mass")
     upper.set_ylabel("displacement")
     lower.plot(
         motion.time, motion.internal_energy, color=REFERENCE, label="internal energy"
     )
     lower.plot(
-        motion.time, motion.kinetic_energy, color=SWITCHED, label="kinetic energy"
+        motion.time, motion.kinetic_energy, color=_SECOND, label="kinetic energy"
     )
     lower.set(xlabel="time", ylabel="energy")
     for axes in (upper, lower):
@@ -47,8 +57,8 @@ def draw_replay(motion: Trajectory, switched: Replay | None) -> Figure:
             axes.axvspan(
                 switched.tr,
                 switched.td,
-                color=FLIGHT,
-                alpha=0.2,
+                color=NEUTRAL,
+                alpha=RIGID_OPACITY,
                 label="rigid",
                 linewidth=0,
             )
@@ -137,7 +147,7 @@ def _draw_outlines(
             fontsize="small",
             ha="center",
             va="center",
-            color=GOOD,
+            color=NEUTRAL,
         )
     axes.set(aspect="equal", xlabel="x [m]", ylabel="z [m]")
     if parameters.drop is None:
@@ -153,19 +163,24 @@ def _draw_times(axes: Axes, reference: Record, windows: Sequence[RigidWindow]) -
     for number, window in enumerate(windows):
         label = "_" if number else "rigid"
         axes.axvspan(
-            window.tr, window.td, color=FLIGHT, alpha=0.2, linewidth=0, label=label
+            window.tr,
+            window.td,
+            color=NEUTRAL,
+            alpha=RIGID_OPACITY,
+            linewidth=0,
+            label=label,
         )
     if reference.released is not None:
         axes.axvline(
             reference.released,
-            color=GOOD,
-            linestyle=":",
+            color=NEUTRAL,
+            linestyle="--",
             linewidth=1,
             label="sled pushed last",
         )
     for number, (start, _) in enumerate(reference.landings):
         label = "_" if number else "landing"
-        axes.axvline(start, color=SWITCHED, linestyle=":", linewidth=1, label=label)
+        axes.axvline(start, color=NEUTRAL, linestyle=":", linewidth=1, label=label)
 
 
 def draw_scan(
@@ -220,15 +235,15 @@ def _mark_times_of_scan(axes: Axes, reference: Record, answer: PairSuggestion) -
         axes.axvspan(
             0,
             reference.released,
-            color=SWITCHED,
-            alpha=0.1,
+            color=NEUTRAL,
+            alpha=RIGID_OPACITY,
             linewidth=0,
             label="the sled pushes",
         )
     if answer.recommended:
         axes.axvline(
             answer.recommended.tr,
-            color=GOOD,
+            color=SWITCHED,
             linestyle="--",
             linewidth=1,
             label="recommended tr",
@@ -250,9 +265,9 @@ def draw_sled(axes: Axes, parameters: Parameters, position: float) -> None:
                 CURB_THICKNESS - 0.04j,
                 -_SLED_LENGTH - 0.04j,
             ),
-            FLIGHT,
+            _SLED,
         ),
-        ((0.0, CURB_THICKNESS, CURB_THICKNESS + 1j * p.curb, 1j * p.curb), SWITCHED),
+        ((0.0, CURB_THICKNESS, CURB_THICKNESS + 1j * p.curb, 1j * p.curb), NEUTRAL),
     ):
         shape = position + np.array(corners) * turn
         axes.add_patch(

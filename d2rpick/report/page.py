@@ -70,10 +70,14 @@ class Markup(str):
 
 
 class PageSection(Markup):
-    """A section of a page, with its title and the id to which the table of contents links."""
+    """A section of a page, with its title and the id to which the table of contents links.
+
+    A section that ``needs_script`` is hidden until its script runs, and so is its link.
+    """
 
     name: str
     anchor: str
+    needs_script: bool = False
 
 
 def make_element(name: str, /, *children: str, **attributes: str) -> Markup:
@@ -181,14 +185,21 @@ def build_section(title: str, *content: str) -> PageSection:
     return _make_section(title, make_element("h2", title), *content)
 
 
+def name_section(
+    content: Markup, title: str, anchor: str, *, needs_script: bool = False
+) -> PageSection:
+    """Return markup as a section to which the table of contents links."""
+    section = PageSection(content)
+    section.name, section.anchor = title, anchor
+    section.needs_script = needs_script
+    return section
+
+
 def _make_section(title: str, *content: str) -> PageSection:
     """Return a section with an id made from its title."""
     letters = (letter if letter.isalnum() else "-" for letter in title.casefold())
     anchor = f"section-{''.join(letters)}"
-    section = PageSection(make_element("section", *content, id=anchor))
-    section.name = title
-    section.anchor = anchor
-    return section
+    return name_section(make_element("section", *content, id=anchor), title, anchor)
 
 
 def build_contents(content: Iterable[str]) -> Markup:
@@ -197,7 +208,11 @@ def build_contents(content: Iterable[str]) -> Markup:
     if len(sections) < _LONG:
         return Markup()
     links = (
-        make_element("li", make_element("a", section.name, href=f"#{section.anchor}"))
+        make_element(
+            "li",
+            make_element("a", section.name, href=f"#{section.anchor}"),
+            class_="of-script" if section.needs_script else "of-page",
+        )
         for section in sections
     )
     return make_element(

@@ -45,12 +45,14 @@ from d2rpick.report.tables import (
     remove_star_column,
     select_known_columns,
 )
+from d2rpick.report.warning_texts import EXPLANATIONS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
     from matplotlib.figure import Figure
 
+    from d2rpick.base.errors import Caution
     from d2rpick.choice.answers import PairSuggestion, PairVerdict
     from d2rpick.choice.parts.sets_of_parts import Parts
     from d2rpick.choice.switched.comparison import Comparison
@@ -355,7 +357,7 @@ def trade_off_page(answer: TradeOff, record: page.PageContext) -> str:
         _draw_suggestion(answer.suggestion),
         _build_figure("explore-", caption, "trade_off", answer, page=True),
         build_section(
-            "Pairs that nothing beats",
+            "Pareto-optimal pairs",
             _build_starred_table(
                 "Pairs",
                 *select_known_columns(*trade_off.build_offer_table(best, answer)),
@@ -481,7 +483,7 @@ def study_page(
         page.build_front(
             [_build_common_card(answer)],
             build_steps(steps),
-            build_remarks(answer.cautions),
+            build_remarks(map(_add_meaning, answer.cautions)),
             build_pairs([*_list_below_card(answer), *study.list_run_reasons(answer)]),
         ),
         _build_figure("runs-", caption, "study", answer, page=True),
@@ -498,6 +500,14 @@ def study_page(
         *page.build_method(command),
         signed=page.CHECKED,
     )
+
+
+def _add_meaning(caution: Caution) -> Caution:
+    """Add to a warning about several runs, which names only these runs, what the warning means for each of them."""
+    if caution.code not in EXPLANATIONS:
+        return caution
+    means = EXPLANATIONS[caution.code].means.partition(". ")[0].rstrip(".")
+    return caution._replace(message=f"{caution.message}. {means}.")
 
 
 def _list_below_card(answer: StudyOfRuns) -> Sequence[tuple[str, str]]:
@@ -575,6 +585,7 @@ def parts_page(
         for name, columns in parts.TABLES.items()
     }
     weights = [("weights", answer.weights.source)] if answer.weights else []
+    remarks = parts.list_page_remarks(answer)
     if answer.inventory:
         deck = page.list_deck_digests(answer.inventory.files, answer.weights)
     else:
@@ -590,8 +601,9 @@ def parts_page(
         *(
             build_section(name, build_scrolling_table(name, *cells))
             for name, cells in tables.items()
+            if answer.rows
         ),
-        build_section("What to know", build_pairs(parts.list_page_remarks(answer))),
+        *([build_section("What to know", build_pairs(remarks))] if remarks else []),
         build_section(
             "What was read",
             build_pairs(

@@ -10,14 +10,14 @@ The misfit may be white noise; its structure, i.e. the part that neighbouring sa
 
 from __future__ import annotations
 
-from functools import partial
+from functools import partial, reduce
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.histories.samples import integrate_by_trapezia
-from d2rpick.vibration.modes import BLOCK, compute_energy_and_jacobian
+from d2rpick.vibration.modes import BLOCK, prepare_energy_and_jacobian
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -26,8 +26,9 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.history import Samples
 
-    # A function that returns energies (n,) at n times, and their derivatives (p, n) with respect to p parameters.
-    Model = Callable[[Samples, Samples], tuple[Samples, Samples]]
+    # A function that returns energies (n,) at n times, and a function that computes their derivatives (p, n) with
+    # respect to p parameters.
+    Model = Callable[[Samples, Samples], tuple[Samples, Callable[[], Samples]]]
 
 
 # Numbers of free parameters of three models: vibration, vibration with plastic work, vibration with preload.
@@ -88,7 +89,7 @@ def fit_few(
     is finite and the misfit has too much structure.
     """
     few_states = _take_few(s, e)
-    model = partial(compute_energy_and_jacobian, size=size)
+    model = partial(prepare_energy_and_jacobian, size=size)
     best = refine(
         _find_starts(poles, *few_states, size=size), model, *few_states, worst
     )
@@ -102,7 +103,7 @@ def fit(
     few: Samples | None, s: Samples, e: Samples, size: int, worst: float = np.inf
 ) -> Samples | None:
     """Fit all samples, starting from the parameters of `fit_few`; None if the misfit is too large."""
-    best = fit_all(few, partial(compute_energy_and_jacobian, size=size), s, e, worst)
+    best = fit_all(few, partial(prepare_energy_and_jacobian, size=size), s, e, worst)
     if best is None:
         return None
     if best[5] < 0:  # q and -q describe the same energy.
@@ -303,44 +304,68 @@ def refine_parameters(
     """
     # The damping of the Levenberg-Marquardt method is small, because the starting values are good.
     damping = 1e-4
-    cost, normal, gradient = _build_normal_equations(parameters, model, s, e)
-    free = gradient.size
+    equations = _build_normal_equations(parameters, model, s, e)
+    if equations is None:  # The energies are not numbers.
+        return parameters, np.nan
     for steps_left in range(_MAX_STEPS, 0, -1):
-        scale = np.sqrt(normal.diagonal()) + 1e-150
-        damped = normal / (scale * scale[:, None])
-        damped.flat[:: free + 1] += damping
-        step = np.linalg.solve(damped, gradient / scale) / scale
+        step = equations.solve(damping)
         trial = parameters.copy()
-        trial[:free] += step
-        expected = float(step @ gradient)
-        trial_cost, *trial_equations = _build_normal_equations(trial, model, s, e)
-        if trial_cost <= cost:
-            parameters, cost, (normal, gradient) = trial, trial_cost, trial_equations
+        trial[: step.size] += step
+        expected = float(step @ equations.gradient)
+        trial_equations = _build_normal_equations(trial, model, s, e, equations.cost)
+        if trial_equations:
+            parameters, equations = trial, trial_equations
             damping = max(damping / 10, 1e-10)
-            if steps_left * expected < cost - hopeless:
+            if steps_left * expected < equations.cost - hopeless:
                 break
         else:
             damping *= 10
-        if expected <= near * cost + 1e-31 * e.size:
+        if expected <= near * equations.cost + 1e-31 * e.size:
             break
-    return parameters, cost
+    return parameters, equations.cost
+
+
+class _NormalEquations:
+    """Squared misfit ``cost``, and the equations whose solution is a step (p,) of p parameters.
+
+    The ``gradient`` (p,) is J times the misfit, where J contains the derivatives of the energies. ``normal`` is J J^T,
+    shape (p, p).
+    """
+
+    def __init__(self, cost: float, normal: Samples, gradient: Samples) -> None:
+        self.cost = cost
+        self.gradient = gradient
+        self._scale = np.sqrt(normal.diagonal()) + 1e-150
+        self._scaled_normal = normal / (self._scale * self._scale[:, None])
+        self._scaled_gradient = gradient / self._scale
+
+    def solve(self, damping: float) -> Samples:
+        """Return the step if ``damping`` is added to the diagonal of the matrix, which is scaled to 1."""
+        damped = self._scaled_normal.copy()
+        damped.flat[:: self.gradient.size + 1] += damping
+        return np.asarray(np.linalg.solve(damped, self._scaled_gradient) / self._scale)
 
 
 def _build_normal_equations(
-    parameters: Samples, model: Model, s: Samples, e: Samples
-) -> tuple[float, Samples, Samples]:
-    """Return the squared misfit, the matrix J J^T of the derivatives J, and J times the misfit, computed by blocks."""
+    parameters: Samples, model: Model, s: Samples, e: Samples, most: float = np.inf
+) -> _NormalEquations | None:
+    """Return the normal equations, computed by blocks; None if the squared misfit exceeds ``most`` or is not a number.
+
+    The derivatives, which take most of the time, are not computed for such a misfit.
+    """
+    cost = 0.0
     blocks = []
     for first in range(0, s.size, BLOCK):
         block = slice(first, first + BLOCK)
-        energy, jacobian = model(parameters, s[block])
+        energy, compute_jacobian = model(parameters, s[block])
         remainder = e[block] - energy
-        cost = float(remainder @ remainder)
-        blocks.append((cost, jacobian @ jacobian.T, jacobian @ remainder))
-    if len(blocks) == 1:
-        return blocks[0]
-    costs, normals, gradients = zip(*blocks, strict=True)
-    return sum(costs), np.sum(normals, axis=0), np.sum(gradients, axis=0)
+        cost += float(remainder @ remainder)
+        if not cost <= most:
+            return None
+        jacobian = compute_jacobian()
+        blocks.append((jacobian @ jacobian.T, jacobian @ remainder))
+    normals, gradients = zip(*blocks, strict=True)
+    return _NormalEquations(cost, reduce(np.add, normals), reduce(np.add, gradients))
 
 
 def evaluate_energies(
@@ -351,7 +376,8 @@ def evaluate_energies(
     normal = np.zeros(())
     for first in range(0, s.size, BLOCK):
         block = slice(first, first + BLOCK)
-        energy[block], jacobian = model(parameters, s[block])
+        energy[block], compute_jacobian = model(parameters, s[block])
+        jacobian = compute_jacobian()
         normal = normal + jacobian @ jacobian.T
     return energy, normal
 

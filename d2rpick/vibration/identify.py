@@ -13,7 +13,7 @@ from d2rpick.vibration.fitting import MAX_MISFIT
 from d2rpick.vibration.modes import (
     SOLVER_FLOOR,
     Mode,
-    compute_energy_and_jacobian,
+    prepare_energy_and_jacobian,
 )
 
 if TYPE_CHECKING:
@@ -348,7 +348,7 @@ class _Attempt(NamedTuple):
 def _evaluate_attempt(parameters: Samples, size: int, record: _Record) -> _Attempt:
     """Evaluate the fit of one mode with its first ``size`` parameters free."""
     fitted, normal = fitting.evaluate_energies(
-        parameters, partial(compute_energy_and_jacobian, size=size), record.s
+        parameters, partial(prepare_energy_and_jacobian, size=size), record.s
     )
     scaled = _make_mode(parameters, 0.0)
     mode = _make_mode(parameters * record.units, record.start)

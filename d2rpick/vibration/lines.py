@@ -91,6 +91,11 @@ class Grid(NamedTuple):
         """Return the time from the first block to the last block [time]."""
         return float(self.time[-1] - self.time[0])
 
+    @property
+    def first_part(self) -> Grid:
+        """Return the first part of the grid, which is fitted to predict the rest."""
+        return self.some(slice(int(FIRST_PART * self.time.size)))
+
     def some(self, blocks: slice) -> Grid:
         """Return a grid with some successive blocks."""
         return self._replace(time=self.time[blocks], energy=self.energy[blocks])
@@ -355,9 +360,8 @@ def _find_best_order(grid: Grid, swing: float) -> _Trial | None:
     """Find the number of exponentials with which the first part of a grid predicts the rest best; None as `predict`."""
     if grid.time.size < _FEWEST_STATES // 2 or not swing > 0:
         return None
-    size_of_first = int(FIRST_PART * grid.time.size)
-    first = grid.some(slice(size_of_first))
-    rest = grid.some(slice(size_of_first, None))
+    first = grid.first_part
+    rest = grid.some(slice(first.time.size, None))
     space = _SignalSpace.of(first)
     tried: list[_Trial] = []
     for order in _ORDERS:

@@ -144,6 +144,8 @@ class ModalVibration:
         Number of states per period of the highest-frequency line that exceeds the noise [-].
     scatter : LineScatter
         Standard deviation of the squared residual due to the scatter of the record about its lines.
+    scatter_of_first_part : LineScatter
+        The same for the lines in the first part of the record.
     with_close_modes : Reading or None
         Interpretation in which two close modes replace one line, and no energy is static; None if not possible.
     swinging : float
@@ -168,6 +170,7 @@ class ModalVibration:
     systematic: float
     states_per_period: float
     scatter: LineScatter
+    scatter_of_first_part: LineScatter
     with_close_modes: Reading | None = None
     swinging: float = 0.0
     bent: float = 0.0
@@ -312,14 +315,11 @@ class ModalVibration:
         """
         reading, level = self.reading, self.reading.level(td)
         squared = reading.residual_squared(tr, td)
-        lines = (
-            np.abs(reading.coherence(tr, td) - self.of_first_part.coherence(tr, td))
-            / level
-        )
         deviation = measures.BAND_DEVIATIONS * self.scatter.compute_deviation(tr, td)
         # The accuracy of the lines follows from the fit and from a second fit to the first part of the record.
         of_lines = np.minimum(
-            np.maximum(deviation, lines), np.maximum(squared, _MOST_OPPOSED)
+            np.maximum(deviation, self._compare_with_first_part(tr, td)),
+            np.maximum(squared, _MOST_OPPOSED),
         )
         of_rest = _REST_COUNTS * self.noise / level * np.sqrt(self._structure_of_rest)
         of_structure = _compute_effect_of_deformation(_NOT_LINEAR, squared)
@@ -344,6 +344,21 @@ class ModalVibration:
             below + np.maximum(-shift - room, 0.0),
             above + np.maximum(shift - room, 0.0),
         )
+
+    def _compare_with_first_part(
+        self, tr: Samples | float, td: Samples | float
+    ) -> Samples:
+        """Return the change of the squared residual by the lines of the first part that noise does not explain [-]."""
+        change = (
+            self.reading.coherence(tr, td) - self.of_first_part.coherence(tr, td)
+        ) / self.reading.level(td)
+        if self._structure_of_rest > 0:
+            return np.abs(change)
+        explained = (
+            measures.BAND_DEVIATIONS
+            * self.scatter_of_first_part.compute_deviation(tr, td)
+        )
+        return np.maximum(np.abs(change) - explained, 0.0)
 
     @property
     def _structure_of_rest(self) -> float:
@@ -633,11 +648,12 @@ def _read(
         doubts = doubts._replace(drift=0.0)
     if kinetic:
         doubts = doubts._replace(negative=0.0, drift=0.0, unstretched=0.0)
+    of_first_part = _read_first_part(reading, prediction, grid, stretches, scatter)
     return ModalVibration(
         time=_close_times(reading, window, grid.time.size),
         reading=reading,
         others=interpretation.others,
-        of_first_part=_read_first_part(reading, prediction, grid, stretches, scatter),
+        of_first_part=of_first_part,
         with_close_modes=None
         if close_modes is None
         else _read_close_modes(reading, close_modes),
@@ -648,6 +664,7 @@ def _read(
             grid.strong, _count_states(spectrum.lines, grid, scatter)
         ),
         scatter=LineScatter(reading, grid, systematic),
+        scatter_of_first_part=LineScatter(of_first_part, grid.first_part, systematic),
         swinging=sum(stretch.energy for stretch in stretches if stretch.swings),
         bent=max((third.second for third in springs), default=0.0),
         source="kinetic energy" if kinetic else "internal energy",

@@ -295,6 +295,14 @@ def compute_energy_and_jacobian(
 
     The parameters are omega, alpha, cosine, sine, energy_plastic and preload of a `Mode` whose origin is s = 0.
     """
+    energy, compute_jacobian = prepare_energy_and_jacobian(parameters, s, size)
+    return energy, compute_jacobian()
+
+
+def prepare_energy_and_jacobian(
+    parameters: Samples, s: Samples, size: int
+) -> tuple[Samples, Callable[[], Samples]]:
+    """Return the energy of `compute_energy_and_jacobian`, and a function that computes the derivatives if needed."""
     omega, alpha, cosine, sine, plastic, preload = parameters.tolist()
     angle = omega * s
     decay = np.exp(-alpha / 2 * s)
@@ -302,15 +310,19 @@ def compute_energy_and_jacobian(
     sin = decay * np.sin(angle)
     swing = cosine * cos + sine * sin
     q = preload + swing
-    twice = q + q
-    # The array is filled in place to save time, because identification spends most of its time here.
-    jacobian = np.empty((size, s.size))
-    by_rate = np.multiply(twice, s, out=jacobian[0])
-    np.multiply(by_rate, swing, out=jacobian[1])
-    jacobian[1] *= -0.5
-    by_rate *= sine * cos - cosine * sin
-    np.multiply(twice, cos, out=jacobian[2])
-    np.multiply(twice, sin, out=jacobian[3])
-    jacobian[4:5] = 1.0
-    jacobian[5:] = twice
-    return plastic + q * q, jacobian
+
+    def compute_jacobian() -> Samples:
+        twice = q + q
+        # The array is filled in place to save time, because identification spends most of its time here.
+        jacobian = np.empty((size, s.size))
+        by_rate = np.multiply(twice, s, out=jacobian[0])
+        np.multiply(by_rate, swing, out=jacobian[1])
+        jacobian[1] *= -0.5
+        by_rate *= sine * cos - cosine * sin
+        np.multiply(twice, cos, out=jacobian[2])
+        np.multiply(twice, sin, out=jacobian[3])
+        jacobian[4:5] = 1.0
+        jacobian[5:] = twice
+        return jacobian
+
+    return plastic + q * q, compute_jacobian

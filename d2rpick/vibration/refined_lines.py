@@ -15,7 +15,6 @@ import numpy as np
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.vibration.fitting import measure_structure
 from d2rpick.vibration.lines import (
-    FIRST_PART,
     MOST_GROWTH,
     PERFECT,
     are_lines,
@@ -92,9 +91,8 @@ def refine_prediction(grid: Grid, prediction: Prediction) -> Prediction:
 
 def _refine_in_first_part(grid: Grid, spectrum: Spectrum) -> Spectrum:
     """Return the lines of the record as the first part of the record alone shows them."""
-    first_part = grid.some(slice(int(FIRST_PART * grid.time.size)))
-    start = fit_weights(first_part, spectrum.lines.poles, spectrum.mean.poles)
-    return _refine_spectrum(first_part, start)
+    poles = spectrum.lines.poles, spectrum.mean.poles
+    return _refine_spectrum(grid.first_part, fit_weights(grid.first_part, *poles))
 
 
 def _refine_spectrum(grid: Grid, spectrum: Spectrum) -> Spectrum:

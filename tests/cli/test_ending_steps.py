@@ -2,10 +2,12 @@
 
 import re
 import shlex
+from math import cos, exp, pi, sin
 from pathlib import Path
 
 import pytest
 
+import d2rpick as d2
 from tests.command import (
     ENERGY,
     MATSUM,
@@ -153,3 +155,47 @@ def test_parts_without_a_set_at_the_given_td_choose_it_themselves() -> None:
     assert step.startswith("let d2rpick choose the times with d2rpick parts")
     words = shlex.split(step.partition("with d2rpick ")[2])
     assert run(*words).stdout.startswith("use with care")
+
+
+# The page that Python writes.
+
+
+def test_pages_written_by_python_name_the_next_step(tmp_path: Path) -> None:
+    table = d2.parts(d2.read(MATSUM), deck=DECK)
+    study = d2.study([ENERGY], td=0.064)
+    for answer, command in ((table, "plan"), (study, "study --td 0.0687534")):
+        written = answer.report(tmp_path / "page.html").read_text("utf-8")
+        assert f"d2rpick {command}" in written.rpartition("To repeat this")[0]
+
+
+def write_run_with_a_rigid_window(folder: Path) -> str:
+    """Write a body that is rigid from 0.02 to 0.08, is pushed from 0.1 to 0.12, and vibrates freely afterwards."""
+    rows = ["time,internal_energy,kinetic_energy,x_momentum,y_momentum,z_momentum,mass"]
+    for step in range(2401):
+        time = step * 2.5e-4
+        pushed = min(max(time - 0.1, 0.0) / 0.02, 1.0)
+        momentum = 5 * (pushed - sin(2 * pi * pushed) / (2 * pi))
+        if time <= 0.1:
+            vibrating = time - min(max(time - 0.02, 0.0), 0.06)
+            energy = 4 * cos(80 * pi * vibrating) ** 2
+        elif time < 0.12:
+            energy = 4 + 30 * sin(pi * pushed) ** 2
+        else:
+            energy = 9 * cos(80 * pi * (time - 0.12)) ** 2 * exp(-1.2 * (time - 0.12))
+        columns = (time, energy, momentum**2 / 2, momentum, 0.0, 0.0, 1.0)
+        rows.append(",".join(f"{value:.9g}" for value in columns))
+    return str(put(folder / "run.csv", "\n".join([*rows, ""])))
+
+
+def test_a_plan_after_a_switched_run_prints_the_windows_that_are_done(
+    tmp_path: Path,
+) -> None:
+    history = write_run_with_a_rigid_window(tmp_path)
+    done = str(put(tmp_path / "done.txt", "0.02 0.08\n"))
+    step = list_first_lines("plan", "--done", done, history)["next"]
+    assert "; they also contain the windows that are done. Then" in step
+    words = shlex.split(step.partition("with d2rpick ")[2].partition(" (")[0])
+    card = run(*("1" if word == "IDS" else word for word in words)).stdout
+    assert "Rigid from 0.02 to 0.08" in card
+    first_plan = list_first_lines("plan", history)["next"]
+    assert "windows that are done" not in first_plan

@@ -391,6 +391,44 @@ def test_keys_and_buttons_move_td(paper: Path, browser: Browser) -> None:
 
 
 @mark_for_browser
+def test_the_numbers_of_the_axes_suit_the_width_of_the_page(
+    paper: Path, browser: Browser
+) -> None:
+    """A page that becomes narrow is drawn as one that was opened narrow, so its numbers do not run together."""
+    from selenium.webdriver.support.wait import WebDriverWait  # slow
+
+    drawn = "return document.querySelector('.explorer .energy canvas').toDataURL()"
+    browser.open(paper, width=320)
+    narrow = browser.driver.execute_script(drawn)
+    browser.open(paper, width=1280)
+    assert browser.driver.execute_script(drawn) != narrow
+    size = {"width": 320, "height": 900, "deviceScaleFactor": 1, "mobile": True}
+    browser.ask("Emulation.setDeviceMetricsOverride", **size)
+    WebDriverWait(browser.driver, timeout=20).until(
+        lambda driver: driver.execute_script(drawn) == narrow
+    )
+
+
+@mark_for_browser
+def test_a_button_for_peaks_is_disabled_if_there_is_no_peak(
+    paper: Path, browser: Browser
+) -> None:
+    browser.open(paper)
+    handle = browser.find(".handle")
+    for key, button in ((Keys.HOME, ".earlier"), (Keys.END, ".later")):
+        handle.send_keys(key)
+        assert browser.find(button).get_attribute("aria-disabled") == "true"
+    browser.find(".earlier").click()
+    assert browser.find(".later").get_attribute("aria-disabled") == "true"
+
+
+def test_the_contents_name_the_interactive_section(paper: Path) -> None:
+    text = paper.read_text("utf-8")
+    assert '<a href="#explorer">What another td would cost</a>' in text
+    assert 'id="explorer"' in text
+
+
+@mark_for_browser
 def test_a_click_on_a_point_of_the_trade_off_selects_it(
     paper: Path, browser: Browser
 ) -> None:

@@ -1,8 +1,11 @@
 """Misfit of a fit: scatter or structure, and when a subset of the samples decides."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
+from d2rpick.histories.history import Samples
 from d2rpick.vibration.fitting import (
     MAX_STRUCTURE,
     VIBRATION,
@@ -15,7 +18,10 @@ from d2rpick.vibration.fitting import (
     measure_structure,
 )
 from d2rpick.vibration.identify import HOPELESS, identify
-from d2rpick.vibration.modes import compute_energy_and_jacobian
+from d2rpick.vibration.modes import (
+    compute_energy_and_jacobian,
+    prepare_energy_and_jacobian,
+)
 
 S = np.linspace(0.0, 1.0, 20_000)
 
@@ -106,9 +112,9 @@ def test_a_fit_that_leaves_far_too_much_is_not_brought_to_its_best_for_all_sampl
 ):
     decays_tried = []
 
-    def model(parameters: np.ndarray, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def model(parameters: Samples, s: Samples) -> tuple[Samples, Callable[[], Samples]]:
         decays_tried.append(s.size)
-        return compute_energy_and_jacobian(parameters, s, VIBRATION)
+        return prepare_energy_and_jacobian(parameters, s, VIBRATION)
 
     start = np.array([20.0, 1.0, 0.7, 0.7, 0.0, 0.0])
     for energy, all_of_them in (
@@ -125,9 +131,9 @@ def test_a_fit_that_leaves_far_too_much_is_not_brought_to_its_best_for_all_sampl
 def test_a_drift_is_fitted_to_some_of_the_samples_only() -> None:
     sizes = []
 
-    def model(parameters: np.ndarray, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def model(parameters: Samples, s: Samples) -> tuple[Samples, Callable[[], Samples]]:
         sizes.append(s.size)
-        return compute_energy_and_jacobian(parameters, s, WITH_PRELOAD)
+        return prepare_energy_and_jacobian(parameters, s, WITH_PRELOAD)
 
     rate = np.array([0.2, 0.5, 0.7, 0.7, 0.0, 1.0])
     rising = S + 0.05 * np.sin(60 * S) ** 2

@@ -46,6 +46,8 @@ if TYPE_CHECKING:
     Look = Callable[[float], "Situation"]
 
 
+# Smallest number of states from which times can be chosen.
+FEWEST_STATES: Final = 3
 # Assumed upper bound of the error in energies from the solver, as a fraction of the highest energy [-].
 _SOLVER_ERROR: Final = 1e-5
 # Energy fluctuations up to this fraction of the largest vibration energy after the load are ignored [-].
@@ -343,14 +345,15 @@ def _choose_time_of_fit(seen: Seen, td: float) -> float:
 
 
 def _check_times(history: History, td: float, settings: Settings) -> None:
-    """Raise RangeError for a record with fewer than 3 states, and for times outside the record."""
-    if history.time.size < 3:
+    """Raise RangeError for a record with fewer than `FEWEST_STATES`, and for times outside the record."""
+    if history.time.size < FEWEST_STATES:
         if history.time.size == 1:
             count = "1 state was"
         else:
             count = f"{history.time.size} states were"
         raise RangeError(
-            f"{', '.join(history.source)}: {count} found, at least 3 were expected; "
+            f"{', '.join(history.source)}: {count} found, "
+            f"at least {FEWEST_STATES} were expected; "
             "write the energies more often, or wait until the run has written them"
         )
     history.energy_at(td, "td")
