@@ -90,8 +90,10 @@ class Laws:
         self.mass = 1.0 if momenta.velocity else momenta.mass(members)
         complete = set(momenta.moving) <= set(members)
         self.extent = float(np.ptp(momentum, axis=0).max())
-        # A state whose time is rounded seems to have the momentum of another time.
-        time_share = momenta.precision.noise(time) / max(float(np.ptp(time)), 1e-300)
+        # A state whose time is rounded seems to have the momentum of another time. Equal time steps are not rounded.
+        unevenness = float(np.abs(np.diff(time, 2)).max(initial=0.0))
+        time_error = min(momenta.precision.noise(time), unevenness)
+        time_share = time_error / max(float(np.ptp(time)), 1e-300)
         self.noise = momenta.noise(members) + min(time_share, 1.0) * self.extent
         largest = float(np.linalg.norm(momentum, axis=1).max())
         share = min(1.0, largest / self.extent) if self.extent > 0 else 0.0
