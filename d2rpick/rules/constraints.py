@@ -327,8 +327,9 @@ def _check_other_constraints(case: Case) -> Iterator[PlacedMessage]:
     satisfies this rule.
 
     Fix: Set the flag to 1 on the card that makes the part rigid and to 2 on the card that switches it back: NCSF for
-    spotwelds, rivets and node sets, NRBF for generalized welds, both for joints and extra nodes. If the constraint
-    joins parts that do not become one rigid body, merge them by LRB first (D2R121).
+    spotwelds, rivets and node sets, NRBF for generalized welds. For joints and extra nodes, set NCSF, and NRBF too if
+    they stay active in the run. If the constraint joins parts that do not become one rigid body, merge them by LRB
+    first (D2R121).
     """
     return _find_active(case, _OTHERS, "D2R121")
 
