@@ -56,7 +56,7 @@ EXPLANATIONS_BY_TOPIC: Final = {
         "no-flight": Explanation(
             "Nothing in the record shows when the load ends, so d2rpick cannot recommend a tr.",
             "If the parts never fly, do not switch them. If they fly, give the end of the load with --after, or write "
-            "the part momenta in the next run.",
+            "the part momenta in the next run. Flights shorter than 5 % of the record are ignored.",
         ),
         "no-free-flight": Explanation(
             "The parts do not fly at this td: a force, a support or a prescribed motion acts on them. The warning "

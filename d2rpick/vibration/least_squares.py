@@ -39,9 +39,12 @@ def solve_least_squares(design: Samples, values: Samples) -> Samples:
     """
     normal = design.T @ design
     scale = np.sqrt(normal.diagonal())
-    with np.errstate(divide="ignore", invalid="ignore"):
+    # Singular values treat a parameter without effect as zero; scaled, it would get a huge value.
+    has_effect = scale.min(initial=np.inf) > _LEAST_SINGULAR * scale.max(initial=0.0)
+    inverse = None
+    if has_effect:
         normal /= np.multiply.outer(scale, scale)
-    inverse = _invert_if_well_conditioned(np.asarray(normal))
+        inverse = _invert_if_well_conditioned(np.asarray(normal))
     if inverse is None:
         return np.asarray(np.linalg.lstsq(design, values, rcond=_LEAST_SINGULAR)[0])
     inverse /= np.multiply.outer(scale, scale)

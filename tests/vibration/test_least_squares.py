@@ -44,3 +44,15 @@ def test_the_scale_of_a_parameter_does_not_matter() -> None:
     design = np.column_stack([1e-7 * np.sin(times), np.cos(times)])
     solution = solve_least_squares(design, np.sin(times) - 2 * np.cos(times))
     assert solution == pytest.approx([1e7, -2.0], rel=1e-12)
+
+
+@pytest.mark.parametrize("size", [1e-10, 1e-14, 0.0])
+def test_a_parameter_without_effect_gets_no_value(size: float) -> None:
+    """The mean of a wave over a block may vanish; a huge weight of this wave would be an error of the whole model."""
+    design = make_model(10.0, 3)
+    design[:, 2] *= size
+    values = np.random.default_rng(4).normal(size=40)
+    solution = solve_least_squares(design, values)
+    expected = np.linalg.lstsq(design, values, rcond=1e-9)[0]
+    assert np.allclose(solution, expected, rtol=1e-9, atol=1e-12)
+    assert np.abs(solution).max() < 1e3

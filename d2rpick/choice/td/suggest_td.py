@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 
 # The search for the best td tries this many of the most promising energy peaks and as many of the last peaks.
 _MOST_PEAKS: Final = 12
-# For many modes, windows of at least these lengths are compared, relative to the longest window [-].
+# If there are many modes, td is chosen among windows of at least these fractions of the longest window [-].
 _LEAST_RIGID: Final = (0.5, 0.25)
 _FEWEST_TD, _MOST_TD = 3, 1000
 # Number of td values in a uniform grid, which gives a smooth curve on paper and on screen.
