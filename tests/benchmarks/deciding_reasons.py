@@ -34,6 +34,7 @@ _NAMES: Final = {
         vibration.modal._TINY vibration.modes._EPS vibration.modes.SOLVER_FLOOR vibration.modes._ZERO
         vibration.moments._ZERO vibration.moments._ROUNDING_DEVIATIONS vibration.oscillator._SMALLEST
         vibration.oscillator._LARGEST
+        vibration.least_squares._MOST_CONDITION vibration.lines._TINY
         """,
     _EFFORT: """
         choice.answers._MOST_REFUSED choice.pair.candidates._MOST choice.pair.candidates._MORE
@@ -55,6 +56,7 @@ _NAMES: Final = {
         vibration.close_modes._MOST_STEPS vibration.close_modes._CONVERGED vibration.close_modes._DAMPING
         vibration.close_modes._LEAST_DAMPING vibration.close_modes._MOST_DAMPING vibration.lines.PERFECT
         vibration.refined_lines._MOST_PARAMETERS vibration.refined_lines._MOST_OF_REST
+        vibration.oscillator_band._TOGETHER
         """,
     _WORDING: """
         choice.pair.decision._ALIKE choice.pair.quality._NAMED choice.pair.warnings._FEW_STATES
@@ -69,6 +71,7 @@ _NAMES: Final = {
         flight.margin._FEWEST flight.window.FEWEST flight.window.FEWEST_STATES_OF_WORK flight.vibrating._FEWEST
         vibration.identify.MIN_SAMPLES vibration.identify.MIN_SAMPLES_PER_PERIOD vibration.lines._EVEN
         vibration.modal.FEWEST_STATES
+        choice.pair.situation.FEWEST_STATES choice.pair.quality._NEIGHBOURS
         """,
     _LOAD: """
         flight.contact_forces._INNER flight.contact_forces._PIECES flight.contact_forces._RISE
@@ -98,6 +101,7 @@ _NAMES: Final = {
         choice.switched.same_model.MOST_MOMENTUM_ERROR choice.switched.comparison._REPORTED_OFF
         choice.switched.comparison._ABOUT choice.switched.frozen._MUCH choice.switched.switched_run._HARDLY
         choice.switched.switched_run._SAME_STATES choice.td.plan._LONGER
+        choice.switched.comparison._STATES_BEFORE choice.switched.switch_times._AT_CONTACT
         """,
     _DOUBT: """
         vibration.doubts.MOST_NEGATIVE vibration.doubts._MOST_NEGATIVE_AT_ALL vibration.doubts._MOST_DRIFT
@@ -121,6 +125,7 @@ _NAMES: Final = {
         vibration.hidden_energy._LIKE_LEVEL vibration.hidden_energy._HIDDEN_LINES vibration.lines._LEAST_TURNS
         vibration.lines._SURE_TURNS vibration.modal._EXACT vibration.modal._SLOW_TOO
         vibration.refined_lines._SAME_LINE vibration.refined_lines._MOST_DECAY vibration.refined_lines._OF_MEAN
+        vibration.lines._FEW_BLOCKS vibration.lines._MANY_BLOCKS vibration.lines._MOST_SWING
         """,
     _FACT: """
         choice.health.MOST_HOURGLASS choice.health.MOST_IMBALANCE choice.health.MOST_SLIDING
