@@ -24,7 +24,12 @@ from d2rpick.flight.window import (
     find_longest_window,
     list_moments,
 )
-from d2rpick.histories.samples import find_window, integrate_by_trapezia, remove_line
+from d2rpick.histories.samples import (
+    compute_median,
+    find_window,
+    integrate_by_trapezia,
+    remove_line,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -76,7 +81,10 @@ def _measure_rounding(time: Samples, precision: Precision) -> float:
     A state whose time is rounded seems to have the momentum of another time.
     """
     error = precision.noise(time)
-    if time.size < FEWEST or error <= _SEEN_IN_INTERVALS * np.median(np.diff(time)):
+    if time.size < FEWEST:
+        return 0.0
+    usual_interval = float(compute_median(np.diff(time)))
+    if error <= _SEEN_IN_INTERVALS * usual_interval:
         return 0.0
     return float(error / np.ptp(time))
 
