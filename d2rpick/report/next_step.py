@@ -308,6 +308,8 @@ def name_step_without_flight(history: History, question: RepeatedQuestion) -> st
         history.time.size, history.start, history.end
     )
     line = write_command(question, "info")
+    if not history.energy.any():
+        return f"choose the internal energy as `energy`; {line} names the columns"
     look = f"see what the run has to write with {line}"
     if not denies_every_flight(history):
         return f"{more}{look}, or give the end of the load as --after"

@@ -114,3 +114,12 @@ def test_a_main_node_that_the_deck_lacks_is_refused_with_those_it_has() -> None:
     assert "no rigid body has the main node 1001" in answer.stderr
     assert "as --node: the deck has 9001" in answer.stderr
     assert run("plan", "-f", "card", "--node", "9001", folder).exit_code == 0
+
+
+def test_an_energy_of_zero_leads_to_the_choice_of_another_column(
+    tmp_path: Path,
+) -> None:
+    rows = "".join(f"{step / 100},0\n" for step in range(100))
+    file = put(tmp_path / "zero.csv", f"time,internal_energy\n{rows}")
+    answer = " ".join(run("suggest", "--td", "0.3", str(file)).stdout.split())
+    assert "next choose the internal energy as --energy; d2rpick info" in answer

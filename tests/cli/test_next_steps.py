@@ -270,10 +270,11 @@ def test_the_next_command_can_be_typed_as_it_stands(
     text = find_line("next", *arguments)
     match = re.search(r"d2rpick (.*?)( \(|\. Then|$)", text)
     assert match, text
-    # Only the user knows the parts of a table, the main deck and the folder for its copy.
-    given = {"IDS": "1", "DECK": DECK, "switched": str(tmp_path / "switched")}
-    for placeholder in {"IDS", "DECK"} & {*shlex.split(match[1])}:
+    # Only the user knows the parts of a table, the bodies, the main deck and the folder for its copy.
+    given = {"IDS": "1", "NODES": "1001", "DECK": DECK}
+    for placeholder in {*given} & {*shlex.split(match[1])}:
         assert f"instead of {placeholder}" in text
+    given["switched"] = str(tmp_path / "switched")
     step = run(*(given.get(word, word) for word in shlex.split(match[1])))
     assert step.exit_code in (0, 1), step.stderr
     assert any(
@@ -493,7 +494,9 @@ def test_a_plan_that_finds_no_pair_says_so_and_names_a_way_out() -> None:
     assert step.endswith(f"d2rpick plan --part flying {history}")
     last = find_line("next", "plan", "--part", "flying", history)
     assert last.startswith("no pair of this run can be used: write the energies more")
-    assert "d2rpick" not in last
+    # The only way left is a switched run, whose deck this command writes.
+    assert last.count("d2rpick ") == 1
+    assert "d2rpick plan --deck DECK --min-quality poor --write-deck switched" in last
 
 
 def test_a_plan_of_short_flights_asks_for_shorter_windows_only_once() -> None:
