@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.api.request import OPTIONS
-from d2rpick.base.errors import ArgumentError
+from d2rpick.base.errors import ArgumentError, DeckError, list_names
 from d2rpick.base.options import (
     POSITIVE,
     TIME,
@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 # This pattern is compiled at its first use, to keep start-up fast.
 _RANGE: Final = r"(\d{1,10})(?:\s*-\s*(\d{1,10}))?"
 _MOST_IDS: Final = 100_000
+# Largest number of main nodes of a deck that are named in a message.
+_MOST_NODES: Final = 8
 _IDS: Final = range(1, UNLIMITED)
 
 
@@ -245,6 +247,8 @@ class Cards:
             ), ()
         name = suiting.name or printing.name
         printing = printing._replace(name=name, end=suiting.end)
+        if self.node:
+            self._refuse_unknown_nodes(deck)
         if not parts or self.node:
             return printing, ()
         from d2rpick.deck.radioss_bodies import find_bodies
@@ -256,6 +260,20 @@ class Cards:
             starter=bodies.cards,
             sensor=bodies.sensor,
         ), bodies.notes
+
+    def _refuse_unknown_nodes(self, deck: str) -> None:
+        """Raise DeckError if a main node belongs to no rigid body of the deck: the engine would skip it silently."""
+        from d2rpick.deck.suiting import list_main_nodes
+
+        nodes = list_main_nodes(deck)
+        wanted = parse_id_ranges("--node", self.node)
+        unknown = [str(node) for node in wanted if node not in nodes]
+        if nodes and unknown:
+            known = list_names([*map(str, nodes)], most=_MOST_NODES)
+            raise DeckError(
+                f"{deck}: no rigid body has the main node {', '.join(unknown)}; give those of the bodies to be "
+                f"switched as `node`: the deck has {known}"
+            )
 
 
 # Keys of the settings that apply to all commands. All other keys apply to the rules or to a single command.

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Findings(Answer):
-    """Answer from `check`; it is immutable.
+    """Immutable answer of `check`.
 
     ``results`` contains the result of each deck, and ``failed`` the decks that could not be read. Paths below ``root``
     are shown relative to it. ``history`` contains the files from which the windows were judged; it is None if there are

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class PartTable(Paged, sets_of_parts.Parts):
-    """Answer from `parts`; it is immutable.
+    """Immutable answer of `parts`.
 
     ``rows`` contains every part with its ``verdict`` and ``reasons``, and ``sets`` the sets that are compared.
     ``recommended`` is the set to use; None if no set is recommended. Its ``parts`` and ``cost_share`` can be given to
@@ -183,7 +183,7 @@ def check_times(tr: float | None, td: float | None) -> Times | float | None:
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Calibration(Answer, calibration.FittedWeights):
-    """Answer from `calibrate`; it is immutable.
+    """Immutable answer of `calibrate`.
 
     ``weights`` can be given to `parts`, `suggest`, `plan`, `explore` and `verify`. ``told`` lists the formulations
     whose weights the runs determine; all others keep their default ratio. ``misfit`` is the rms misfit relative to the

@@ -38,7 +38,7 @@ _UNKNOWN = 0.5
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Drive(Paged, Driven):
-    """Answer from ``d2rpick drive``; it is immutable."""
+    """Immutable answer of ``d2rpick drive``."""
 
     command: tuple[str, ...]
     kind = "drive"

@@ -35,7 +35,7 @@ _STEPS: Final = 200  # Default number of td values that are explored.
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Exploration(RunAnswer, trade_off.TradeOff):
-    """Answer from `explore`; it is immutable.
+    """Immutable answer of `explore`.
 
     ``offers`` are sorted by td; each has ``tr``, ``error``, ``rigid_time``, ``unbeaten`` (True if Pareto-optimal),
     ``quality``, and its measures in ``best``. ``recommended`` is the offer that `suggest` chooses. ``start`` is the
@@ -164,7 +164,7 @@ def explore_for_question(
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Plan(RunAnswer, planning.RunPlan):
-    """Answer from `plan`; it is immutable.
+    """Immutable answer of `plan`.
 
     ``flights`` has a row per flight with ``window``, ``status`` and ``reason``. ``windows`` contains the windows (tr,
     td) that this run supports; ``all_windows`` also contains those that require a switched run first. ``next_run``

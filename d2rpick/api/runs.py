@@ -416,8 +416,8 @@ def extract_columns(
     """Return the selected columns of a run, all quantities known at the same times, and notes on them.
 
     The columns, each of shape (n,), are ``time``, ``internal_energy``, ``part_<id>`` for each part if there are
-    several, ``not_chosen_part_<id>`` for each other part that flies with them, quantities of the whole model, and the
-    momentum that shows the flight.
+    several, ``not_chosen_part_<id>`` or ``not_chosen_spring_<id>`` for each other part that flies with them, quantities
+    of the whole model, and the momentum that shows the flight.
     """
     from d2rpick.base.errors import list_names
     from d2rpick.choice.question import Reference
@@ -440,7 +440,8 @@ def extract_columns(
     not_chosen = list_flying_parts_not_chosen(history)
     energies_not_chosen = history.evidence.internal_energies(not_chosen)
     if not_chosen and energies_not_chosen is not None:
-        names = [name_energy_of_part_not_chosen(part) for part in not_chosen]
+        springs = history.evidence.springs
+        names = [name_energy_of_part_not_chosen(part, springs) for part in not_chosen]
         table |= dict(zip(names, energies_not_chosen.values.T, strict=True))
         others = list_names([part.name for part in not_chosen])
         note = (

@@ -51,7 +51,7 @@ _LAST: Final = b'{"schema": '
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Study(Paged, core.StudyOfRuns):
-    """Answer from `study`; it is immutable.
+    """Immutable answer of `study`.
 
     ``runs`` has a row per run. ``agree`` is True if the tr intervals of all runs overlap; None if there is no tr.
     ``common`` contains one tr for all judged runs, with the window that they share and the ``errors`` of the runs at

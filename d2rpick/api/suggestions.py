@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Suggestion(RunAnswer, answers.PairSuggestion):
-    """Answer from `suggest`; it is immutable.
+    """Immutable answer of `suggest`.
 
     ``candidates`` are in order of rank, best first. ``recommended`` and ``better_pair`` have ``tr``, ``td`` and
     ``residual``, or are None, with the reason in ``warnings``; the better pair may be the recommended pair. ``quality``
@@ -108,7 +108,7 @@ class Suggestion(RunAnswer, answers.PairSuggestion):
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Verdict(RunAnswer, answers.PairVerdict):
-    """Answer from `verify`; it is immutable.
+    """Immutable answer of `verify`.
 
     ``verified`` is True if the pair can be used. ``reasons`` states why it cannot be used, or what to keep in mind.
     ``tr_ok`` and ``td_ok`` are None if the record does not show whether the time is suitable. ``candidate`` contains

@@ -105,12 +105,14 @@ class TimeArguments:
 def is_time_with_unit(text: str) -> bool:
     """Return True for a string that consists of a number and a unit of time.
 
+    Hours are refused, because no explicit run lasts that long, so the letter is a slip.
+
     Examples
     --------
-    >>> [is_time_with_unit(text) for text in ("64ms", "1.5 min", "64", "64 mm")]
-    [True, True, False, False]
+    >>> [is_time_with_unit(text) for text in ("64ms", "1.5 min", "64", "64 mm", "64 h")]
+    [True, True, False, False, False]
     """
-    return parse_seconds(text) is not None
+    return parse_seconds(text) is not None and not text.rstrip().endswith("h")
 
 
 def find_unit_of_deck(deck: str | None) -> TimeUnit:

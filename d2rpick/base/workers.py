@@ -39,7 +39,7 @@ _STARTS = 3
 _DYING = 0.1  # Pause between attempts to start a pool [s], in which the system finishes ending a killed process.
 # Errors that are raised if a process is started after the fork server was killed.
 _NOT_STARTED = (BrokenProcessPool, EOFError, OSError)
-# Filter, in the form of PYTHONWARNINGS, of the warnings that begin with the name of the resource tracker.
+# Filter, as in PYTHONWARNINGS, for warnings whose text begins with the name of the resource tracker.
 _QUIET_TRACKER = "ignore:resource_tracker:UserWarning"
 # Longest wait for a reply from the scheduler [s].
 _PATIENCE = 10

@@ -71,10 +71,10 @@ class PairVerdict(AnswerAtTd):
     """The answer of ``verify``: the measures of one pair, and the reasons for and against it.
 
     ``tr_ok`` and ``td_ok`` are None if the record does not show whether the time is suitable. ``remarks`` are the
-    ``reasons`` that are not objections to the pair, or that only repeat that the residual is large. ``computed``
-    contains the finished switched run, and ``switched`` its comparison with the reference run, if there is such a run.
-    ``tr_interval`` is the output interval of the switched run that contains tr [time]; None if tr was given instead of
-    read from this run.
+    ``reasons`` that are not objections to the pair, or that only repeat that the residual is large; ``errors`` are the
+    latter. ``computed`` contains the finished switched run, and ``switched`` its comparison with the reference run, if
+    there is such a run. ``tr_interval`` is the output interval of the switched run that contains tr [time]; None if tr
+    was given instead of read from this run.
     """
 
     situation: Situation
@@ -85,6 +85,7 @@ class PairVerdict(AnswerAtTd):
     reasons: tuple[str, ...]
     cautions: tuple[Caution, ...]
     remarks: tuple[str, ...] = ()
+    errors: tuple[str, ...] = ()
     switched: Comparison | None = None
     health: Health | None = None
     computed: History | None = None
@@ -125,7 +126,7 @@ class PairVerdict(AnswerAtTd):
             self.situation,
             self.candidate,
             objections=() if self.admissible else objections or unknown,
-            is_admissible=self.admissible,
+            errors=self.errors,
             best_residual=self._best_residual,
             better=better,
             cure_of_objections=self._cure_of_objections,
@@ -251,6 +252,7 @@ def verify_at(situation: Situation, tr: float) -> PairVerdict:
         admissible=bool(judged.recommendable[0]),
         reasons=(*candidate.notes, *(excess.message for excess in exceeded)),
         remarks=_list_remarks(judged, candidate),
+        errors=list_shown_errors(judged, candidate),
         cautions=(*warn_about_td(situation), *warn_about_place(situation, tr)),
     )
 
@@ -267,6 +269,13 @@ def list_separate_objections(
     """Return the objections to a candidate, but those to a large error only if the residual does not show the error."""
     is_shown = candidate.residual is not None and candidate.residual > POOR_RESIDUAL
     return judged.list_objections(max(candidate.rank - 1, 0), of_error=not is_shown)
+
+
+def list_shown_errors(judged: Candidates, candidate: Candidate) -> tuple[str, ...]:
+    """Return the objections to a candidate that the residual shows, so that they are not among the separate ones."""
+    separate = list_separate_objections(judged, candidate)
+    objections = judged.list_objections(max(candidate.rank - 1, 0))
+    return tuple(text for text in objections if text not in separate)
 
 
 def _check_order(tr: float, td: float) -> None:
@@ -412,7 +421,7 @@ class PairSuggestion(AnswerAtTd):
             self.situation,
             candidate,
             objections=(*objections, *messages),
-            is_admissible=candidate.admissible,
+            errors=list_shown_errors(self.candidates, candidate),
             best_residual=self.recommended.residual if self.recommended else None,
             better=self._find_better_than(candidate),
             best_of=None if self.clearly_better else self.compared_td,

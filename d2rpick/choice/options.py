@@ -74,7 +74,7 @@ class Limit(NamedTuple):
 
 
 class Use(NamedTuple):
-    """Commands and answers that use an option of a choice, and the limit that the option sets.
+    """The use of an option for choosing times: the commands and functions that have it, and the limit that it sets.
 
     ``limit`` is the `Limit` that the value of the option sets; None if the option is not a limit. If ``of_cards`` is
     True, ``card`` and ``check --history`` also have the option, and if ``of_sets`` is True, ``parts`` and ``study``

@@ -90,8 +90,9 @@ def info(request: Request, output: Output) -> None:
 def extract(write_as: str | None, request: Request, output: Output) -> None:
     """Write the chosen energy of HISTORY as columns time and internal_energy.
 
-    With several parts, a column part_<id> follows for each.  A column not_chosen_part_<id> follows for each other part
-    that flies with the chosen parts, so that d2rpick judges this table as it judges the original run.  The momenta and
+    With several parts, a column part_<id> follows for each.  A column not_chosen_part_<id> or not_chosen_spring_<id>
+    follows for each other part that flies with the chosen parts, so that d2rpick judges this table as it judges the
+    original run.  The momenta and
     kinetic energies of single parts are not written; without them, times and errors may differ from those of the run.
     Other columns are quantities of the whole model, such as total internal energy, kinetic energy, external work and
     momentum.  If the files contain part momenta, the momentum is the sum over the parts that fly together with the

@@ -58,6 +58,7 @@ DECK_OF_PARTS: Final = (
     f"{DECK}.  `--part recommended` is the set that d2rpick parts recommends."
 )
 # Sections of the help; options that belong to no section come first.
+_CARDS: Final = "Cards"
 GROUPS: Final[dict[str, tuple[str, ...]]] = {
     "Times": (
         *("tr", "td", "td_window", "steps", "min_rigid"),
@@ -66,7 +67,7 @@ GROUPS: Final[dict[str, tuple[str, ...]]] = {
     ),
     "What to read": ("history", "switched", "from", *READING, "done", "before"),
     "Deck and cost": ("deck", "no_deck", "weights", "write_deck"),
-    "Cards": CARDS,
+    _CARDS: CARDS,
     "Output": (
         *("all", "limit", "plot", "report", *RESULT),
         *("verbose", "show_settings", "debug", "help"),
@@ -134,10 +135,17 @@ class Command(Documented):
             spell_option(parameter).replace("-", "_"): parameter.get_help_record(ctx)
             for parameter in shown_options
         }
-        grouped = {name for names in GROUPS.values() for name in names}
+        # A command that prints no cards may have an option of the same name with another meaning.
+        prints_cards = "merge" in records
+        groups = {
+            title: names
+            for title, names in GROUPS.items()
+            if title != _CARDS or prints_cards
+        }
+        grouped = {name for names in groups.values() for name in names}
         for title, names in {
             "Options": [parameter for parameter in records if parameter not in grouped],
-            **GROUPS,
+            **groups,
         }.items():
             if rows := [record for name in names if (record := records.get(name))]:
                 with formatter.section(title):

@@ -22,7 +22,7 @@ from d2rpick.base.errors import (
 )
 from d2rpick.base.files import write_as_a_whole
 from d2rpick.base.options import UNLIMITED, make_option, make_option_name
-from d2rpick.cli.progress import is_on_terminal, show_reading
+from d2rpick.cli.progress import is_on_terminal, show_computing, show_reading
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -180,13 +180,14 @@ class Output:
         self.result(name_options_and_wrap(text, self.output_format, now.width))
 
     def beside_answer(self, answer: Paged, page: Callable[[], str]) -> None:
-        """Write the figure and the page if the user requests them."""
-        if self.plot:
-            from d2rpick.report import figures
+        """Write the figure and the page if the user requests them; their computation is shown on a terminal."""
+        with show_computing(quiet=self.quiet):
+            if self.plot:
+                from d2rpick.report import figures
 
-            self.write(self.plot, figures.render(answer.plot(), self.plot))
-        if self.report:
-            self.write(self.report, encode_text(replace_arguments(page())))
+                self.write(self.plot, figures.render(answer.plot(), self.plot))
+            if self.report:
+                self.write(self.report, encode_text(replace_arguments(page())))
 
     def finish(self, *, objection: bool) -> None:
         """Exit with code 1 if the answer is a failure, unless ``--exit-zero`` is given."""

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
     FloatType = click.ParamType[float]
 else:
-    FloatType = click.ParamType  # This class is generic since click 8.4.
+    FloatType = click.ParamType  # This class has been generic since click 8.4.
 
 CARDS: Final = tuple(list_options(Cards))
 _PAIR: Final = 2  # Number of values of an option that takes a pair.

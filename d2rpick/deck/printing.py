@@ -51,7 +51,7 @@ if TYPE_CHECKING:
 
 _FILE: Final = "switches.k"
 
-# CODE values that wait until a force ends and until a force acts, by kind of contact.
+# For each kind of contact, the CODE for a switch when its force ends, and that for a switch when its force acts.
 _CODES: Final = {"INTER": (2, 4), "RWALL": (1, 3)}
 _OF_OFFSET: Final = "OFFSET was not tested with the solver: it should exceed the thickness of the contact."
 _LEFT_ACTIVE = (

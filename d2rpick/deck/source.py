@@ -36,7 +36,7 @@ BYTE_ORDER_MARK: Final = b"\xef\xbb\xbf"  # Byte order mark of UTF-8.
 
 # Number of bytes whose complete lines are processed at a time.
 _PIECE: Final = 4 << 20
-# Number of sections of a block in which line endings are counted; a section fits into the processor cache.
+# Line endings of a block are counted in this number of sections, so that each section fits into the processor cache.
 _COUNTED: Final = 16
 _GZIP: Final = b"\x1f\x8b\x08"
 _FIRST: Final = 1 << 16  # Number of bytes that should contain a line ending.

@@ -115,7 +115,7 @@ def choose_frame_parts(
 
 
 def _estimate_doubt(shape: Samples, bent: Samples, mass: Samples) -> float:
-    """Return by how much the rotation between two times varies if the parts of the frame are omitted one at a time.
+    """Estimate how much the rotation between two times varies when the parts of the frame are omitted one at a time.
 
     This is a jackknife estimate. The positions of the parts relative to their centre, shape (parts, 3), deviate from a
     rigid shape by ``bent`` (n, parts, 3). Two parts on a line do not determine an angle; the result is then 0.

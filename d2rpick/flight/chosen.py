@@ -87,11 +87,10 @@ def _limit_by_supports(history: History, flight: Flight, td: float) -> Flight:
     """
     if flight.start is None or flight.refusal or flight.by_parts:
         return flight
-    start, end = history.surroundings.free(history.parts, td) or (-inf, inf)
-    end = min(end, inf if flight.end is None else flight.end)
-    return flight._replace(
-        start=max(start, flight.start), end=None if end == inf else end
-    )
+    free_start, free_end = history.surroundings.free(history.parts, td) or (-inf, inf)
+    start = max(free_start, flight.start)
+    end = free_end if flight.end is None else min(free_end, flight.end)
+    return flight._replace(start=start, end=None if end == inf else end)
 
 
 def find_flight(
@@ -205,12 +204,10 @@ def start_flight_at(
         ended = f"the flight ends at {flight.end:.6g} according to the {name_source(flight.source)}, before `after`"
         return Flight(refusal=flight.refusal or ended, doubts=flight.doubts)
     doubts = flight.doubts
-    shows_start = (
-        flight.source != "oscillator"
-    )  # The oscillator was fitted from `after` on, so its start is not the end of the load.
-    if shows_start and after < flight.start - get_agreement_limit(
-        history, *flight.within(history.time)
-    ):
+    # An oscillator was fitted from `after` on, so its start is not the end of the load.
+    shows_start = flight.source != "oscillator"
+    room = get_agreement_limit(history, *flight.within(history.time))
+    if shows_start and after < flight.start - room:
         evidence = f"the {name_source(flight.source)} shows that the flight begins at {flight.start:.6g}"
         doubts = (
             *doubts,
@@ -293,11 +290,10 @@ def _explain_why_fed(history: History, start: float, end: float) -> str | None:
     energy = history.mean_energy(start, end)
     if balance is None or energy is None or balance.kinetic_and_internal is None:
         return None
-    turns = int(np.count_nonzero((history.turns > start) & (history.turns < end)))
-    if (
-        turns < _LEAST_TURNS
-        and float(np.ptp(history.between(start, end)[1])) > MOST_WORK * energy
-    ):
+    is_inside = (history.turns > start) & (history.turns < end)
+    turns = int(np.count_nonzero(is_inside))
+    _, internal = history.between(start, end)
+    if turns < _LEAST_TURNS and float(np.ptp(internal)) > MOST_WORK * energy:
         return f"from {start:.6g} to {end:.6g} the internal energy has {turns} extrema: too few to recognise a flight"
     from d2rpick.flight.work import compute_change_of_balance
 

@@ -37,7 +37,7 @@ BY_ENERGIES: Final = ("contact-energy", "energy-balance")
 # Largest work of a load on the parts in a flight, relative to their internal energy [-].
 # Such work changes the deformation by 2 %; smaller changes do not affect the ranking of pairs.
 MOST_WORK: Final = 0.04
-# Sources that cover the contacts of all parts, so they must confirm each flight from a more reliable source.
+# Sources that cover the contacts of all parts. They must confirm each flight that a more reliable source shows.
 _AGREEING: Final = ("contact-force", "contact-energy")
 # Sources that may miss a load, because some forces are not written and fixed walls do no work.
 _PARTIAL: Final = (*BY_ENERGIES, "contact-force")
@@ -487,7 +487,8 @@ def _limit_to_level(
             )
         else:
             damped = None
-        if history.parts is not None:
+        # A load acts on the whole model, so the energy of single parts does not show it.
+        if history.parts is not None or history.evidence.not_chosen:
             energy = np.interp(time, balance.time, balance.internal)
     start = find_settled_time(
         time,
@@ -503,11 +504,8 @@ def _limit_to_level(
         whole = None if damped is None else damped[-1 if flight.gravity else 0]
         if rises_as_it_yields(time, energy, whole, flight.start, start, flight.end):
             start = flight.start
-    if (
-        start is None
-        or start > td
-        or flight.end - start < SHORTEST * (time[-1] - time[0])
-    ):
+    shortest = SHORTEST * (time[-1] - time[0])
+    if start is None or start > td or flight.end - start < shortest:
         return None
     if damped is not None and not flight.gravity:
         first, last = np.interp((flight.start, start), time, damped[0])
@@ -522,9 +520,11 @@ def _find_nearest(
     """For a td outside all flights, return the last flight before td if there is one, otherwise the next flight."""
     flights = witness.flights()
     earlier_flights = [flight for flight in flights if flight.end < td]
-    nearest = (
-        earlier_flights[-1] if earlier_flights else flights[0] if flights else None
-    )
+    nearest: FreeFlight | None = None
+    if earlier_flights:
+        nearest = earlier_flights[-1]
+    elif flights:
+        nearest = flights[0]
     return Seen(nearest, witness.source if nearest else None, refusal, doubts)
 
 

@@ -6,6 +6,7 @@ Parts that fly together obey p' = g - alpha p in each component, with constant g
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from d2rpick.histories.history import Balance, Momenta, Samples
+    from d2rpick.histories.history import Balance, Momenta, Precision, Samples
 
 # _GRAVITY: gravity in m, inches and feet per second squared; other units change it by a power of 10.
 # _ALIKE: accelerations that differ by at most this fraction are treated as equal to gravity [-]; 1 in 200 loads do.
@@ -63,8 +64,21 @@ _FADED, _LITTLE = 0.6, 0.02
 _STRAIGHT = 0.01
 # Changes of momentum up to this multiple of the fitting error are treated as zero [-].
 _UNSEEN = 2.0
+# Rounding errors of times up to this fraction of the output interval move no end of a flight by a state [-].
+_SEEN_IN_INTERVALS = 0.1
 # Relative error of the work of gravity computed from the states [-].
 _OF_WORK = 2e-3
+
+
+def _measure_rounding(time: Samples, precision: Precision) -> float:
+    """Return the rounding error of printed times (n,) over their span [-]; 0 if it is hardly seen in their intervals.
+
+    A state whose time is rounded seems to have the momentum of another time.
+    """
+    error = precision.noise(time)
+    if time.size < FEWEST or error <= _SEEN_IN_INTERVALS * np.median(np.diff(time)):
+        return 0.0
+    return float(error / np.ptp(time))
 
 
 class Laws:
@@ -90,11 +104,8 @@ class Laws:
         self.mass = 1.0 if momenta.velocity else momenta.mass(members)
         complete = set(momenta.moving) <= set(members)
         self.extent = float(np.ptp(momentum, axis=0).max())
-        # A state whose time is rounded seems to have the momentum of another time. Equal time steps are not rounded.
-        unevenness = float(np.abs(np.diff(time, 2)).max(initial=0.0))
-        time_error = min(momenta.precision.noise(time), unevenness)
-        time_share = time_error / max(float(np.ptp(time)), 1e-300)
-        self.noise = momenta.noise(members) + min(time_share, 1.0) * self.extent
+        self.noise = momenta.noise(members)
+        self.noise_of_times = self.extent * _measure_rounding(time, momenta.precision)
         largest = float(np.linalg.norm(momentum, axis=1).max())
         share = min(1.0, largest / self.extent) if self.extent > 0 else 0.0
         self._enough = _ENOUGH * share if complete else min(TOLERANCE, _ENOUGH * share)
@@ -126,10 +137,18 @@ class Laws:
     def _lasting(
         self, law: Law, td: float, enough: float = 0.0
     ) -> tuple[int, int] | None:
-        """Return the states around ``td`` that obey a law of motion even with a tighter tolerance."""
-        return find_lasting_window(
-            law, td, self.extent, self.noise, fades=True, enough=enough
+        """Return the states around ``td`` that obey a law of motion even with a tighter tolerance.
+
+        The rounding of the times is allowed for only if there are no such states otherwise, because a larger tolerance
+        makes the ends of a flight less accurate.
+        """
+        find = partial(
+            find_lasting_window, law, td, self.extent, fades=True, enough=enough
         )
+        window = find(self.noise)
+        if window is None and self.noise_of_times > 0:
+            window = find(self.noise + self.noise_of_times)
+        return window
 
     @property
     def is_carried(self) -> bool:

@@ -367,7 +367,8 @@ class Bodies:
         apart: Sequence[Part] = (),
         staying: Sequence[Part] = (),
     ) -> None:
-        self.told, self.apart = tuple(told or ()), tuple(apart)
+        self.told = tuple(told or ())
+        self.apart = tuple(apart)
         self.staying = tuple(staying)
         self._known = tuple(drift for drift in drifts if drift)
         self._complete = len(self._known) == len(drifts) > 0

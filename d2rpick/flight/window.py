@@ -33,8 +33,9 @@ SHORTEST, FEWEST = 0.05, 12
 # Smallest number of states from which a load, gravity and damping can be separated; twice the number of unknowns.
 FEWEST_STATES_OF_WORK: Final = 6
 # _ENDS: fraction of a window that is excluded at each end when the misfit inside the flight is determined [-].
-# _REACH_OF_DIGITS: factor by which a misfit due to printed digits may grow if the ends are included [-].
-# _REACH: factor by which any other misfit may grow if the ends are included [-].
+# The misfit of the whole window may exceed the misfit without its ends by the following factors [-].
+# _REACH_OF_DIGITS: factor for the part of the misfit that is due to the rounding of printed numbers.
+# _REACH: factor for the rest of the misfit.
 _ENDS, _REACH_OF_DIGITS, _REACH = 0.1, 1.5, 3.0
 # Relative resolution of all quantities [-], because solvers sum in single precision.
 ROUND_OFF = 1e-7
@@ -335,14 +336,16 @@ def _cut_off_hidden_push(
     are ignored, because they cannot be resolved.
     """
     first, last = window
-    wide = find_longest_window(law, (first + last) // 2, 4 * room)
+    wide_first, wide_last = find_longest_window(law, (first + last) // 2, 4 * room)
     most_states = round(_ENDS * (last - first))
-    return (
-        first + min(most_states, max(0, first - wide[0] - 1)) if wide[0] > 0 else first,
-        last - min(most_states, max(0, wide[1] - last - 1))
-        if wide[1] < law.time.size - 1
-        else last,
-    )
+    # A window that reaches an end of the record shows no force there.
+    if wide_first > 0:
+        gained_states = max(0, first - wide_first - 1)
+        first += min(most_states, gained_states)
+    if wide_last < law.time.size - 1:
+        gained_states = max(0, wide_last - last - 1)
+        last -= min(most_states, gained_states)
+    return first, last
 
 
 def _is_long_enough(time: Samples, window: tuple[int, int]) -> bool:

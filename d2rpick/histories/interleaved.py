@@ -22,7 +22,10 @@ _MOST_PARTS: Final = 1000
 
 
 def is_of_several_parts(time: Samples, energy: Samples) -> bool:
-    """Return True if an energy (n,) jumps between rows of equal times (n,), as the energies of several parts do."""
+    """Return True if an energy (n,) jumps between rows of the same time, because the rows alternate between parts.
+
+    ``time`` (n,) contains the times of the rows.
+    """
     rows = count_rows_per_time(time)
     if rows == 1:
         return False

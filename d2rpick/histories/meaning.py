@@ -264,7 +264,10 @@ def find_quantities(names: Sequence[str]) -> dict[str, list[str]]:
 
 
 def _find_subject(names: Sequence[str]) -> tuple[str, ...]:
-    """Return the words that name the part or model of the internal energy; empty unless exactly one column holds it."""
+    """Return the words in the only name of an internal energy that name its part or model.
+
+    The result is empty if several names, or none, denote an internal energy.
+    """
     indices = find_internal_energies(names)
     meaning = find_meaning(names[indices[0]]) if len(indices) == 1 else None
     return meaning.others if meaning else ()

@@ -24,6 +24,7 @@ from d2rpick.histories.history import (
 )
 from d2rpick.histories.meaning import (
     is_any_internal_energy,
+    is_total_internal_energy,
     note_other_quantity,
     note_unused_energies,
 )
@@ -39,6 +40,7 @@ from d2rpick.histories.surroundings import UNKNOWN, Surroundings
 from d2rpick.histories.table_forces import find_forces
 from d2rpick.histories.table_parts import (
     find_parts_not_chosen,
+    find_springs_not_chosen,
     read_energies_of_parts_not_chosen,
 )
 
@@ -151,9 +153,9 @@ class OpenedRun:
                 partial(_list_energy_channels, database, selection)
             )
             if chosen is not None:
-                notes += note_unused_energies(
-                    database.channels, {*chosen, *database.quantities.values()}
-                )
+                totals = filter(is_total_internal_energy, database.channels)
+                used = {*chosen, *database.quantities.values(), *totals}
+                notes += note_unused_energies(database.channels, used)
         return tuple(notes)
 
     def momenta(
@@ -531,8 +533,9 @@ class _Written(Given):
 
     @cached_property
     def springs(self) -> tuple[Part, ...]:
-        """Springs and dampers of the run, judging by their energies."""
-        return self._run.springs
+        """Springs and dampers of the run, judging by their energies, or by the names of the columns of a table."""
+        database = self._find_table_with_others()
+        return find_springs_not_chosen(database) if database else self._run.springs
 
     @cached_property
     def not_chosen(self) -> tuple[Part, ...]:

@@ -78,7 +78,8 @@ class Sled:
     """Prescribed motion of the sled: constant deceleration from ``speed`` [m/s] to rest within ``braking`` [s]."""
 
     def __init__(self, speed: float, braking: float) -> None:
-        self._speed, self._braking = speed, braking
+        self._speed = speed
+        self._braking = braking
 
     def velocity(self, time: float) -> float:
         """Return the velocity along x [m/s]."""
@@ -100,7 +101,8 @@ class Contact:
     def __init__(self, structure: Structure, parameters: Parameters) -> None:
         self.sled = Sled(parameters.speed, parameters.braking)
         self._p = parameters
-        self._skin, self._toes = structure.skin, structure.toes
+        self._skin = structure.skin
+        self._toes = structure.toes
         self._points = structure.places.size
         self._into_sled = complex(np.exp(1j * np.radians(parameters.tilt)))
         self._crushed = np.zeros(self._toes.size)
@@ -291,7 +293,8 @@ class BoxMotion:
         self._mobility = self.dt / s.masses
         self.places = s.places.copy()
         self.velocities: Plane = np.full(s.places.size, complex(parameters.speed))
-        self.box, self.step = Bars(s.box, s.places.size), Bars(s.step, s.places.size)
+        self.box = Bars(s.box, s.places.size)
+        self.step = Bars(s.step, s.places.size)
         self.contact = Contact(s, parameters)
         self.body: RigidPoints | None = None
         self._rigid_points = slice(0)

@@ -1,4 +1,4 @@
-"""Compute complete box runs, with or without rigid windows, their histories, and scans over tr."""
+"""Compute runs of the box model, with or without rigid windows, make histories of them, and scan over tr."""
 
 from __future__ import annotations
 

@@ -44,7 +44,8 @@ def describe_expectation(decision: Decision) -> str:
     worst = decision.worst_case
     if worst == "the same":
         return decision.expected
-    return f"{decision.expected}. At worst: {worst}"
+    effect = ", which hardly changes the motion" if decision.allows_only_motion else ""
+    return f"{decision.expected}. At worst: {worst}{effect}"
 
 
 def list_statements(decision: Decision) -> Lines:

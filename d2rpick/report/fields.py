@@ -176,8 +176,9 @@ _KINDS: Final = {**_KNOWN, **{f"{name}?": maybe(kind) for name, kind in _KNOWN.i
 
 
 class Document(NamedTuple):
-    """A result as JSON: its schema ``name``, its description, and the fields after the fields of every document.
+    """A result as JSON: its schema ``name``, its description, and its own fields.
 
+    They follow the fields that are common to all documents.
     Objects of a ``closed`` document have no other keys.  ``also`` lists objects of other forms of the result, which the
     schema defines too.
     """
@@ -208,7 +209,7 @@ class Document(NamedTuple):
         return row(*head, *self.row.fields, later=later, **further_keys)
 
     def of(self, answer: Any, command: Sequence[str]) -> dict[str, Any]:
-        """Return the content of the JSON document; ``command`` contains the arguments that repeat the answer."""
+        """Return the content of the JSON document; ``command`` contains the arguments that reproduce it."""
         head = {
             "schema": self.name,
             "tool_version": __version__,

@@ -43,6 +43,8 @@ _OTHER_LIMITS: Final = (
     "--min-rigid",
     "--tolerance",
 )
+# Advice on a table whose run has no deck at hand.
+_ADD_COLUMNS: Final = "; without a deck, add columns mass, x_momentum, y_momentum and z_momentum to the table"
 # Reason why the card of several parts needs the main deck.
 _NEEDS_DECK: Final = (
     f"main deck of the run instead of {_SOME_DECK}; "
@@ -214,13 +216,16 @@ def _keep_td(times: Sequence[str]) -> Sequence[str]:
     return ()
 
 
-def _name_step_to_better_record(decision: Decision, question: RepeatedQuestion) -> str:
+def _name_step_to_better_record(
+    history: History, decision: Decision, question: RepeatedQuestion
+) -> str:
     """Return the step after a pair that the record cannot support: the deck of the run, or a change of the record."""
     if decision.needs_deck:
         deck = name_deck_of_run(question)
         words = (*_keep_td(question.times), "--deck", deck.name)
         line = write_command(_allow_deck(question), "suggest", *words)
-        return f"judge the run with its deck: {line}{deck.hint}"
+        without = _ADD_COLUMNS if history.format in ("csv", "hdf5") else ""
+        return f"judge the run with its deck: {line}{deck.hint}{without}"
     return f"improve the record: {decision.cure}; no pair of it can be used before"
 
 
@@ -383,7 +388,7 @@ def name_step_after_refusal(
         line = write_command(question, "plan", new_parts=decision.better_parts)
         return f"make other parts rigid; judge them with {line}"
     if decision is not None and decision.needs_better_record:
-        return _name_step_to_better_record(decision, question)
+        return _name_step_to_better_record(situation.history, decision, question)
     if decision is not None and decision.is_outside_flight and better is None:
         line = write_command(question, "suggest")
         return f"choose both times in the flight with {line}"

@@ -1,6 +1,6 @@
 """Build HTML pages from elements, which nested calls make and which escape all text, and from shared sections.
 
-Shared sections are the cards of a pair, the input that was read, and how to repeat the answer.
+Shared sections are the cards of a pair, the input that was read, and how to reproduce the answer.
 """
 
 from __future__ import annotations
@@ -460,7 +460,7 @@ def list_digests(files: Iterable[Read]) -> list[tuple[str, str]]:
 def list_deck_digests(
     deck: Iterable[Read], weights: Weights | None
 ) -> list[tuple[str, str]]:
-    """Return the digests of a deck's files, the main file first, and of the weights; long lists are cut."""
+    """Return the digests of the files of a deck, main file first, and of the weights; long lists are truncated."""
     files = list({file.name: file for file in deck}.values())
     hidden_count = len(files) - _MOST_FILES
     if hidden_count > 0:

@@ -401,7 +401,7 @@ def plan_page(
     run : Run
         The run that was read.
     command : sequence of str
-        Arguments that repeat the answer.
+        Arguments that reproduce the answer.
     card : str or None
         Solver input for the next run, if the parts to be switched are known.
     explored : Explorer, optional
@@ -564,7 +564,7 @@ def parts_page(
     command: Sequence[str],
     question: RepeatedQuestion | None = None,
 ) -> str:
-    """Write the page of ``parts``; ``command`` contains the arguments that repeat the answer.
+    """Write the page of ``parts``; ``command`` contains the arguments that reproduce the answer.
 
     ``question`` has the words of the next command; without them the page names none.
     """

@@ -80,7 +80,7 @@ def _get_situation(row: PlannedFlight) -> Situation | None:
 
 
 def _make_margin_getter(key: str) -> Callable[[PlannedFlight], Any]:
-    """Return a function that reads a value from the margin of a window; None if the window has been used."""
+    """Return a function that reads an attribute of the `Margin` of a row; None if its window is already in the past."""
     return lambda row: None if row.done else getattr(row.margin, key)
 
 

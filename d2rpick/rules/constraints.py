@@ -359,10 +359,10 @@ def _check_other_constraints(case: Case) -> Iterator[PlacedMessage]:
     "a deleted joint, weld or set of extra nodes (NRBF 1, NCSF 1) that joins separate bodies",
 )
 def _check_separated_joints(case: Case) -> Iterator[PlacedMessage]:
-    """While NRBF 1 or NCSF 1 deletes a joint, weld or extra nodes, only the rigid body of the parts connects them. The
-    parts separate if they become several rigid bodies, or if one of them stays deformable. Nodal rigid bodies on
-    the parts may hold the joint; NRBF 1 deletes them too. Source: vendor keyword data for NRBF, NCSF and LRB. It is not
-    tested whether the flags act on joints and extra nodes, so the rule only warns.
+    """If NRBF 1 or NCSF 1 deletes a joint, weld or set of extra nodes, only a common rigid body still connects its
+    parts. The parts separate if they become several rigid bodies, or if one of them stays deformable. Nodal rigid
+    bodies on the parts may hold the joint; NRBF 1 deletes them too. Source: vendor keyword data for NRBF, NCSF and LRB.
+    Whether the flags act on joints and extra nodes has not been tested, so the rule only warns.
 
     Fix: Switch all parts and merge them by LRB. If they move relative to each other in the flight, like a door on its
     hinge, keep all of them deformable.

@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 
 def refuse_held(path: str, inventory: Inventory, parts: Collection[int]) -> None:
     """Raise DeckError if a support holds one of the parts, because a support force is not a contact force."""
-    if unknown := sorted(set(parts) - inventory.nodes_by_part.keys()):
+    unknown = sorted(set(parts) - inventory.nodes_by_part.keys())
+    if unknown:
         raise DeckError(
             f"{path}: {name_units(unknown)}: no elements in the deck; name others"
         )
@@ -75,7 +76,8 @@ def _check_history(path: str, starter: Starter, parts: Collection[int]) -> None:
                 words |= {*row.text.split()}
         if words & {"DEF", "XMOM"}:
             written |= {int(word) for word in words if word.isdigit()} or {*parts}
-    if missing := sorted({*parts} - written):
+    missing = sorted({*parts} - written)
+    if missing:
         where = cards[0].at if cards else path
         raise DeckError(
             f"{where}: no momenta of {name_units(missing)} in the time history; /TH/PART with DEF and MASS of all parts"

@@ -127,7 +127,8 @@ class Driver:
         D2RPickError
             If the solver fails or the disk is full. The next call of `drive` continues the run from there.
         """
-        if legs := self.journal.legs:
+        legs = self.journal.legs
+        if legs:
             self.report(
                 f"resumed: {len(legs)} engine runs are done, the last until {legs[-1].order.until:.6g}"
             )
@@ -141,7 +142,8 @@ class Driver:
             if (not begun or self._find_problem(order)) and not self._take_back(order):
                 self._start(order)
             self._wait_for_end()
-            if problem := self._find_problem(order):
+            problem = self._find_problem(order)
+            if problem:
                 self._recover(order, problem)
             else:
                 self._end(order)
@@ -180,7 +182,8 @@ class Driver:
 
     def _start(self, order: Order) -> None:
         """Write the engine file of an engine run and start the engine."""
-        number, legs = order.number, self.journal.legs
+        number = order.number
+        legs = self.journal.legs
         self.solver.check_room(number)
         replaces_a_leg = bool(legs) and legs[-1].order.number == number
         if order.kind == PROBE and replaces_a_leg and self.journal.has_just_ended:
@@ -245,7 +248,8 @@ class Driver:
 
     def _end(self, order: Order) -> None:
         """Record the findings of an engine run in the journal."""
-        number, legs = order.number, self.journal.legs
+        number = order.number
+        legs = self.journal.legs
         joined_legs = collect_joined_legs(order, legs)
         first = joined_legs[0]
         histories = [str(self.solver.history(leg.number)) for leg in joined_legs]
@@ -301,7 +305,8 @@ def find_leg_results(order: Order, evidence: GrowingEvidence) -> LegFindings:
     tr = _choose_end(order, history, free)
     half_period = evidence.motion.longest_swing(history.end)
     findings = LegFindings(free=free, flies=flies, tr=tr, swing=half_period)
-    if flies and (swing := find_swing(history, free, tr)):
+    swing = find_swing(history, free, tr) if flies else None
+    if swing:
         findings = findings._replace(
             steady_from=swing.flight, swing_warning=swing.warning
         )
@@ -338,9 +343,8 @@ class Journal:
     def __init__(self, path: Path) -> None:
         self.path = path
         content = path.read_bytes() if path.exists() else b""
-        self.records = [
-            record for line in content.split(b"\n") if (record := parse_record(line))
-        ]
+        records = map(parse_record, content.split(b"\n"))
+        self.records = [record for record in records if record]
         self._line_end = b"\n" if content and not content.endswith(b"\n") else b""
 
     @property
@@ -359,9 +363,11 @@ class Journal:
     @property
     def has_failed(self) -> bool:
         """True if the next engine run has failed before."""
-        events = [record["event"] for record in self.records]
-        begun = ("started", "restored")
-        return [event for event in events if event not in begun][-1:] == ["failed"]
+        beginnings = ("started", "restored")
+        for record in reversed(self.records):
+            if record["event"] not in beginnings:
+                return bool(record["event"] == "failed")
+        return False
 
     @property
     def has_just_ended(self) -> bool:

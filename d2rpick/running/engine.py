@@ -110,7 +110,8 @@ class Commands(NamedTuple):
         """Return the environment of the programs: the current environment plus the variables of an installation."""
         environment = {"OMP_NUM_THREADS": str(self.threads), "OMP_STACKSIZE": "400m"}
         libraries = os.environ.get("LD_LIBRARY_PATH", "")
-        if home := os.environ.get(_HOME):
+        home = os.environ.get(_HOME)
+        if home:
             environment["RAD_CFG_PATH"] = f"{home}/hm_cfg_files"
             libraries = f"{home}/exec:{libraries}:{home}/syslib".replace("::", ":")
         return {**environment, **os.environ, "LD_LIBRARY_PATH": libraries}
@@ -169,7 +170,9 @@ class Solver:
     """
 
     def __init__(self, folder: Path, name: str, commands: Commands) -> None:
-        self.folder, self.name, self.commands = folder, name, commands
+        self.folder = folder
+        self.name = name
+        self.commands = commands
         self._lock_path = folder / ".solver.lock"
         self._replaced = folder / ".drive.replaced"
         self._process: subprocess.Popen[bytes] | None = None
@@ -253,7 +256,8 @@ class Solver:
             code = self._process.poll()
             if code is None:
                 return True
-            self._process, self._signal = None, max(-code, 0)
+            self._process = None
+            self._signal = max(-code, 0)
         lock = _lock(self._lock_path)
         if lock is not None:
             os.close(lock)
@@ -288,7 +292,9 @@ class Solver:
         """Return the cycle count and CPU time [s] of an engine run; None if its listing does not contain them."""
         path = str(self.file(number, ".out"))
         timing = find_radioss_timing(path, read_tail(path, _TAIL_SIZE))
-        return (timing.cycles or None, timing.total or None) if timing else (None, None)
+        if timing is None:
+            return None, None
+        return timing.cycles or None, timing.total or None
 
     def whole(self, number: int) -> bool:
         """Return True if an engine run, or the starter (number 0), has left complete restart files for all domains.

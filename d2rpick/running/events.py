@@ -112,14 +112,16 @@ def _suggest_switch(history: History, flight: SeenFlight) -> Iterator[RunEvent]:
     if flight.wait.source == "at-rest":
         yield RunEvent("switch", flight.seen, flight.seen, tr=flight.seen)
         return
-    wait, end = flight.wait.time, flight.end or np.inf
+    wait = flight.wait.time
+    end = flight.end or np.inf
     last = flight.seen + wait
     times, energies = history.between(flight.seen, last)
     for now, energy in zip(times.tolist(), energies.tolist(), strict=True):
         if now >= end:
             return
-        energies_so_far = history.between(now - wait, now)[1]
-        lowest, highest = float(energies_so_far.min()), float(energies_so_far.max())
+        _, energies_so_far = history.between(now - wait, now)
+        lowest = float(energies_so_far.min())
+        highest = float(energies_so_far.max())
         in_range = EnergyRange(energy, lowest, highest)
         if energy >= lowest + _HIGH * (highest - lowest):
             swing = _find_strong_swing(history, flight, now)

@@ -55,7 +55,8 @@ class GrowingEvidence:
         # Evidence to which states are still appended, keyed by its parts; None is the key for the whole model.
         self._going_on: dict[tuple[Part, ...] | None, GrowingWitness] = {}
         self._first_momenta: Samples | None = None
-        self._has_moved, self._largest_momentum = RunningMaximum(), 0.0
+        self._has_moved = RunningMaximum()
+        self._largest_momentum = 0.0
         # True for each state at which the part momenta add up to the momentum of the model.
         self._complete = GrowingColumn()
 
@@ -203,7 +204,8 @@ class GrowingEvidence:
         momenta = history.find_momenta(of_parts=witness.parts is not None)
         assert momenta is not None
         begin = int(np.searchsorted(momenta.time, witness.time[0]))
-        start, end = begin + first, begin + last
+        start = begin + first
+        end = begin + last
         states = [*_sample_states(begin, start), *_sample_states(start + 1, end)]
         so_far = select_states(momenta, np.array(states, np.intp))
         laws = get_laws_of(so_far, witness.members, history.balance)

@@ -83,16 +83,22 @@ class _Motion:
     """
 
     def __init__(self, name: str, halves_per_swing: float = 1.0) -> None:
-        self.name, self._factor = name, halves_per_swing
+        self.name = name
+        self._factor = halves_per_swing
         # True once an unforced oscillation has been detected.
         self.has_free_swing = False
         # The first half period has no duration, because it ends when the motion is first detected.
         self._swings: list[_HalfPeriod] = []
         # The columns contain the time, the value, and the smallest change that is treated as an oscillation.
         self._columns = GrowingColumn()
-        self._highest, self._lowest = RunningMaximum(), RunningMaximum()
-        # State at the last extremum, most extreme state since then, and direction (1 rising, -1 falling).
-        self._turn, self._extreme, self._sign = 0, 0, 1
+        self._highest = RunningMaximum()
+        self._lowest = RunningMaximum()
+        # State at the last extremum.
+        self._turn = 0
+        # Most extreme state since then.
+        self._extreme = 0
+        # Direction of the motion since then: 1 rising, -1 falling.
+        self._sign = 1
 
     def add(
         self, time: Samples, values: Samples, least_swing: Samples
@@ -115,7 +121,8 @@ class _Motion:
             elif -beyond_extreme > limit:
                 if self._extreme - self._turn >= _FEWEST_STATES:
                     yield self._measure(rows[self._turn : self._extreme + 1], now)
-                self._turn, self._extreme = self._extreme, state
+                self._turn = self._extreme
+                self._extreme = state
                 self._sign = -self._sign
 
     def _begin(self, rows: Samples) -> None:
@@ -204,7 +211,8 @@ class InnerMotion:
         # Motions of parts, keyed by the number of earlier times without motion, the part index and the axis index.
         self._part_motions: dict[tuple[int, int, int], _Motion] = {}
         self._rest_count = 0
-        self._largest_speed, self._largest_energy = RunningMaximum(), RunningMaximum()
+        self._largest_speed = RunningMaximum()
+        self._largest_energy = RunningMaximum()
         # Time at which the part motions begin to be used instead of the energy [time].
         self._parts_since = np.inf
         # Longest half period of any part so far; a new entry is added each time it increases.

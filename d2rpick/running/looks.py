@@ -78,7 +78,8 @@ class Looks:
         """
         if not self._names <= {*names}:
             # If a file no longer exists, all files are read from their start.
-            self.resume_points, self.record = {}, GrowingRecord()
+            self.resume_points = {}
+            self.record = GrowingRecord()
         follows = self.record.history is not None
         states = self._read_on(names)
         new_states = states and self.record.extend(states)
@@ -86,7 +87,8 @@ class Looks:
             whole = self._read_whole(names)
             new_states = self.record.extend(whole)
             if new_states is None:
-                self.record, follows = GrowingRecord(), False
+                self.record = GrowingRecord()
+                follows = False
                 new_states = self.record.extend(whole)
                 assert new_states is not None  # An empty record accepts all states.
         self._names = frozenset(names)

@@ -194,7 +194,8 @@ def choose_next_leg(legs: Sequence[Leg], limits: Limits) -> Order | None:
     """
     if not legs:  # The first engine run can show whether parts fall from rest.
         return Order(LOAD, 1, 0.0, min((FEWEST + 2) * limits.interval, limits.end))
-    last, findings = legs[-1].order, legs[-1].findings
+    last = legs[-1].order
+    findings = legs[-1].findings
     if findings.contact is not None:
         order = _return_before_contact(legs, limits)
     elif last.until >= limits.end:
@@ -225,7 +226,8 @@ def _order_load(last: Order, findings: LegFindings, limits: Limits) -> Order:
 
     A flight in which a window has ended is not switched again.
     """
-    now, end = last.until, limits.end
+    now = last.until
+    end = limits.end
     legs_left = MOST_LEGS - _KEPT_BACK - last.number
     if legs_left <= 0:
         return last.following(LOAD, end)
@@ -241,7 +243,8 @@ def _order_load(last: Order, findings: LegFindings, limits: Limits) -> Order:
 
 def _order_probe(legs: Sequence[Leg], limits: Limits) -> Order:
     """Schedule the next part of a probe that began earlier or begins after the last engine run."""
-    last, findings = legs[-1].order, get_flight_findings(legs)
+    last = legs[-1].order
+    findings = get_flight_findings(legs)
     flown = 0.0
     if last.rigid:
         flown = last.until - collect_joined_legs(last, legs)[0].start
@@ -264,7 +267,8 @@ def _return_before_contact(legs: Sequence[Leg], limits: Limits) -> Order:
     findings = get_flight_findings(legs)
     if window.reason:
         switch_after = window.tr + limits.same
-        if replaced := find_replaced_leg(orders[0], legs):
+        replaced = find_replaced_leg(orders[0], legs)
+        if replaced:
             return replaced.order._replace(switch_after=switch_after)
         load = _order_load(orders[0].undone(), findings, limits)
         return load._replace(switch_after=switch_after)
@@ -279,7 +283,8 @@ def _return_before_contact(legs: Sequence[Leg], limits: Limits) -> Order:
 def find_next_window(legs: Sequence[Leg], limits: Limits) -> Window:
     """Return the window before the contact that the last engine run showed or, without a contact, up to its end."""
     rigid_orders = collect_joined_legs(legs[-1].order, legs)
-    findings, contact = get_flight_findings(legs), legs[-1].findings.contact
+    findings = get_flight_findings(legs)
+    contact = legs[-1].findings.contact
     window = Window(
         findings.free,
         rigid_orders[0].start,
@@ -345,10 +350,10 @@ def collect_joined_legs(order: Order, legs: Sequence[Leg]) -> list[Order]:
     """Return the engine runs since parts last became rigid or deformable, including the given one."""
     latest = {leg.order.number: leg.order for leg in legs}
     joined = [order]
-    while (previous := latest.get(joined[0].number - 1)) and (
-        previous.rigid is order.rigid
-    ):
+    previous = latest.get(order.number - 1)
+    while previous and previous.rigid is order.rigid:
         joined.insert(0, previous)
+        previous = latest.get(previous.number - 1)
     return joined
 
 

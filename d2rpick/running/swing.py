@@ -33,9 +33,12 @@ class Swing(NamedTuple):
     @property
     def warning(self) -> str:
         """The warning that is printed before the body becomes rigid."""
-        motion, limit = "still moves relative to the others", "about"
         if self.at_most:
-            motion, limit = "moves relative to the other, or both rotate", "at most"
+            motion = "moves relative to the other, or both rotate"
+            limit = "at most"
+        else:
+            motion = "still moves relative to the others"
+            limit = "about"
         return (
             f"{self.name} {motion}: at td the body may be out of place by {limit} {self.error:.3g}; "
             f"this is less than {MOST_OF_PATH:.0%} of its path only in a flight longer than {self.flight:.3g}"

@@ -161,7 +161,7 @@ def follow(
     names: Sequence[str], selection: Selection, wait: float | None = None, inventory: Inventory | None = None,
     *, lasting: float | None = None, rest: Callable[[float], None] = time.sleep,
 ) -> Iterator[News]:  # fmt: skip
-    """Yield the events of a run until it ends or ``lasting`` [s] have passed; see `Watch` for the other arguments."""
+    """Yield the events of a run until it ends or ``lasting`` seconds have passed; see `Watch` for others."""
     watch = Watch(names, selection, wait, inventory)
     end = time.monotonic() + (float("inf") if lasting is None else lasting)
     while True:

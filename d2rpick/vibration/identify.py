@@ -166,7 +166,7 @@ def identify(
         largest = fitting.WITH_PRELOAD
         few_fits[largest] = fitting.fit_few(poles, record.s, record.e, largest, worst)
         if few_fits[largest] is None:
-            return _is_out_of_reach(time)
+            return refuse_out_of_reach(time)
     attempts = _fit_models(poles, record, worst, few_fits)
     return _choose_first_to_follow(attempts, record)
 
@@ -218,7 +218,7 @@ def _choose_first_to_follow(
         refused.append(identification)
     if refused:
         return min(refused, key=lambda identification: identification.rms)
-    return _is_out_of_reach(np.array([record.start, record.end]))
+    return refuse_out_of_reach(np.array([record.start, record.end]))
 
 
 def _prefer_through_zero(
@@ -249,7 +249,8 @@ def _prefer_through_zero(
     )
 
 
-def _is_out_of_reach(time: Samples) -> Identification:
+def refuse_out_of_reach(time: Samples) -> Identification:
+    """Return the refusal of a record, with states at times (n,), that no oscillator nearly describes."""
     return _refuse_without_fit(
         time,
         f"no vibration comes near the energy: a few samples miss it by more than {MAX_MISFIT}",
@@ -269,7 +270,7 @@ def judge_given(
     if quick and np.var(
         energy[every_so_many] - mode.energy(time[every_so_many])
     ) > HOPELESS * np.var(energy[every_so_many]):
-        return _is_out_of_reach(time)
+        return refuse_out_of_reach(time)
     record = _Record.scaled(time, energy)
     start = record.start
     cosine = mode.deformation(start) - mode.preload

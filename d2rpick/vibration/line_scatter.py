@@ -36,12 +36,14 @@ class LineScatter:
     grid: Grid
     systematic: float
 
-    def compute_deviation(self, tr: Samples | float, td: Samples | float) -> Samples:
-        """Return the standard deviation of the squared residual for pairs of broadcastable times [-]."""
+    def compute_deviation(
+        self, tr: Samples | float, td: Samples | float, squared: Samples
+    ) -> Samples:
+        """Return the standard deviation of the ``squared`` residual of pairs of broadcastable times [-]."""
         tr, td = np.broadcast_arrays(
             np.asarray(tr, dtype=np.float64), np.asarray(td, dtype=np.float64)
         )
-        gradient = self._compute_gradient(tr.ravel(), td.ravel())
+        gradient = self._compute_gradient(tr.ravel(), td.ravel(), np.ravel(squared))
         deviation = np.linalg.norm(gradient @ self._spread, axis=1)
         return np.asarray(deviation.reshape(tr.shape))
 
@@ -73,8 +75,8 @@ class LineScatter:
         of_mean = np.maximum(np.abs(spectrum.mean.weights), self.reading.tiny)
         return np.concatenate([sizes, sizes, decays, rates, of_mean])
 
-    def _compute_gradient(self, tr: Samples, td: Samples) -> Samples:
-        """Return the derivatives of the squared residual by all parameters, shape (n, p) [1/energy, time/1].
+    def _compute_gradient(self, tr: Samples, td: Samples, squared: Samples) -> Samples:
+        """Return the derivatives of the ``squared`` residual by all parameters, shape (n, p) [1/energy, time/1].
 
         R^2 = 1 + [V(tr) - 2 V(m) + H(m) - C(tr, td)] / H(td), which neglects the small change of U within a period.
         """
@@ -96,7 +98,6 @@ class LineScatter:
             of_level += _differentiate_level(lines, td) * raised
         gradient = np.hstack([lost, of_mean])
         level_gradient = np.hstack([of_level, level_of_mean])
-        squared = reading.residual_squared(tr, td)
         level = reading.level(td)
         return np.asarray(
             (gradient - (squared - 1)[:, np.newaxis] * level_gradient)

@@ -54,7 +54,7 @@ _ABOVE_NOISE: Final = 20.0
 _ALL_POWER, _STRONG_POWER = 1 - 2e-5, 0.95
 # Fraction of the record, from its start, that is searched for spectral lines that decay early [-].
 _EARLY: Final = 0.25
-# _LEAST_TURNS: smallest number of cycles of a line in the record.
+# _LEAST_TURNS: smallest number of cycles that a line must complete within the record.
 # _SURE_TURNS: a line with more than this number of cycles cannot be confused with slow changes of the mean.
 # _MOST_DAMPED: largest decay rate of a line, as a fraction of its angular frequency [-].
 # MOST_DECAY: largest exponent with which a line decays within the record [-].
@@ -167,7 +167,7 @@ def make_even_grid(time: Samples, energy: Samples) -> Grid:
 
 
 def _count_turns(time: Samples, values: Samples) -> tuple[float, float]:
-    """Return the numbers of cycles that the highest relevant and highest strong frequencies complete in times (n,)."""
+    """Return how many cycles the highest relevant and the highest strong frequency complete over the record."""
     since_start = time - time[0]
     trend = np.polyval(np.polyfit(since_start, values, 2), since_start)
     tapered = (values - trend) * np.hanning(time.size)
@@ -195,6 +195,11 @@ class Exponentials(NamedTuple):
 
     def at(self, t: Samples | float) -> Samples:
         """Return the value at each time, with the shape of ``t`` [energy]."""
+        if not self.poles.imag.any():
+            # Real exponentials take a tenth of the time of complex ones.
+            since_origin = np.asarray(t, dtype=np.float64) - self.origin
+            decays = np.exp(np.multiply.outer(since_origin, self.poles.real))
+            return np.asarray(decays @ self.weights.real)
         return np.asarray((self.waves(t) @ self.weights).real)
 
     def waves(self, t: Samples | float) -> Complex:

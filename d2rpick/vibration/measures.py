@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from d2rpick.histories.history import Samples
-    from d2rpick.vibration.amplitudes import SignedAmplitudes
     from d2rpick.vibration.modes import Mode
 
     # Values for n times, as arrays of shape (n,) keyed by name; unknown values are NaN.
@@ -42,6 +41,11 @@ _PHASES_COUNT = 1.5
 
 class Deformation(Protocol):
     """Interface of a vibration model: products of deformations at different times, and energies."""
+
+    def compare(
+        self, tr: Samples | float, td: Samples | float
+    ) -> tuple[Samples, Samples]:
+        """Return `separation` and `overlap` from one evaluation, with the shape of ``tr`` [energy]."""
 
     def elastic_energy(self, t: Samples | float) -> Samples:
         """Return the elastic energy of the deformation, with the shape of ``t`` [energy]."""
@@ -78,19 +82,22 @@ def measured(
     vibration: Deformation,
     tr: Samples,
     td: Samples | float,
-    tolerance: Samples,
+    find_tolerances: Callable[[Samples], Samples],
     band: Band,
 ) -> Columns:
-    """Compute a column for each field of `Measured` from times tr (n,) and one ``td``, or a td for each tr."""
-    lock_in = lock_in_error(vibration, tr, td)
+    """Compute a column for each field of `Measured` from times tr (n,) and one ``td``, or a td for each tr.
+
+    ``find_tolerances`` returns the timing tolerances of the times [time], given their frozen-deformation errors [-].
+    """
+    lock_in, has_sign = compare(vibration, tr, td)
     error, lowest, highest = bound_residuals(vibration, lock_in, tr, td, band)
     return {
-        "sign_match": sign_match(vibration, tr, td).astype(np.float64),
+        "sign_match": has_sign.astype(np.float64),
         "lock_in_error": lock_in,
         "residual": error,
         "residual_low": lowest,
         "residual_high": highest,
-        "timing_tolerance": tolerance,
+        "timing_tolerance": find_tolerances(lock_in),
     }
 
 
@@ -177,8 +184,8 @@ def sign_match(
     return np.asarray(vibration.overlap(tr, td) >= 0)
 
 
-def compare_signed(
-    vibration: SignedAmplitudes, tr: Samples, td: float
+def compare(
+    vibration: Deformation, tr: Samples, td: Samples | float
 ) -> tuple[Samples, NDArray[np.bool_]]:
     """Return `lock_in_error` and `sign_match` of each tr, from one evaluation of its deformation."""
     separation, overlap = vibration.compare(tr, td)
@@ -255,15 +262,18 @@ def run_time_share(
     return 1 - rigid_fraction * (1 - (1 - cost_share) / step_ratio)
 
 
-def timing_tolerance(mode: Mode, tr: Samples, td: Samples | float) -> Samples:
+def timing_tolerance(
+    mode: Mode, tr: Samples, td: Samples | float, errors: Samples
+) -> Samples:
     """Return the time by which each tr (n,) may be wrong in either direction before L grows by 0.05 [time].
 
+    ``errors`` are the frozen-deformation errors L of each tr [-].
     The limit is the nearest time at which |q - q(td)| exceeds its value at tr by the tolerated growth. If it never
     does, the limit is one period, because q has then passed through all its values.
     """
     wanted = np.broadcast_to(mode.deformation(td), tr.shape)
     amplitude = np.sqrt(mode.vibration_energy(td))
-    room = (lock_in_error(mode, tr, td) + TOLERATED_GROWTH) * amplitude
+    room = (errors + TOLERATED_GROWTH) * amplitude
     half_period = np.pi / mode.omega
     still = mode.standstill_after(tr)
     # Times of zero velocity on both sides of tr, in columns: first those after each tr, then those before it.

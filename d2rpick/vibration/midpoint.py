@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from d2rpick.base.caching import cached_property
+from d2rpick.base.tuples import NamedTuple
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -31,6 +32,18 @@ if TYPE_CHECKING:
     from d2rpick.vibration.lines import Complex, Exponentials, Spectrum
 
     Mask = NDArray[np.bool_]
+
+
+class Comparison(NamedTuple):
+    """The elastic energies at tr and at td, the product of both deformations, and the coherence of the modes [energy].
+
+    Noise may make elastic energies negative.
+    """
+
+    elastic_energy_tr: Samples
+    elastic_energy_td: Samples
+    overlap: Samples
+    coherence: Samples
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -60,6 +73,11 @@ class Reading:
         return self.spectrum.lines.some(self.is_mode)
 
     @cached_property
+    def _other_lines(self) -> Exponentials:
+        """Return the lines that are not those of modes."""
+        return self.spectrum.lines.some(~self.is_mode)
+
+    @cached_property
     def _peak_energies(self) -> Samples:
         """Return the peak energy of each mode at the time origin [energy]."""
         return 2 * (1 + self.hidden_pairs) * np.abs(self.modes.weights)
@@ -70,9 +88,7 @@ class Reading:
         energy = self.modes.at(t) + np.interp(t, self.times, self.rest)
         if self.no_static:
             return np.asarray(
-                energy
-                + self.spectrum.mean.at(t)
-                + self.spectrum.lines.some(~self.is_mode).at(t)
+                energy + self.spectrum.mean.at(t) + self._other_lines.at(t)
             )
         return np.asarray(energy + self.level_of_modes(t) / 2)
 
@@ -133,20 +149,25 @@ class Reading:
 
         The product is clipped to its bounds, because noise or a wrong model may cause values beyond them.
         """
+        return self.compare(tr, td).overlap
+
+    def compare(self, tr: Samples | float, td: Samples | float) -> Comparison:
+        """Return what is known of pairs of times, which may be broadcast."""
         middle = (np.asarray(tr) + td) / 2
         level = self.level(middle)
         coherence = self.coherence(tr, td)
         free = self.elastic_energy(middle) - level / 2 + coherence / 2
-        bound = self.bound(tr, td)
-        return np.clip(free, -bound, bound)
-
-    def bound(self, tr: Samples | float, td: Samples | float) -> Samples:
-        """Return the largest possible product of deformations with the elastic energies at tr and td [energy]."""
-        energies = (np.maximum(self.elastic_energy(t), 0.0) for t in (tr, td))
-        at_tr, at_td = energies
-        return np.asarray(np.sqrt(at_tr * at_td))
+        at_tr = self.elastic_energy(tr)
+        at_td = self.elastic_energy(td)
+        # The largest possible product of deformations with these elastic energies.
+        bound = np.sqrt(np.maximum(at_tr, 0.0) * np.maximum(at_td, 0.0))
+        return Comparison(at_tr, at_td, np.clip(free, -bound, bound), coherence)
 
     def residual_squared(self, tr: Samples | float, td: Samples | float) -> Samples:
         """Return the squared residual R^2 of pairs of times [-]."""
-        lost = self.elastic_energy(tr) - 2 * self.overlap(tr, td)
+        return self.square_residual(self.compare(tr, td), td)
+
+    def square_residual(self, pairs: Comparison, td: Samples | float) -> Samples:
+        """Return the squared residual R^2 of pairs of times that were compared [-]."""
+        lost = pairs.elastic_energy_tr - 2 * pairs.overlap
         return np.maximum(1 + lost / self.vibration_energy(td), 0.0)

@@ -114,10 +114,10 @@ class ModeAtTd(NamedTuple):
 
 
 class _Course(NamedTuple):
-    """Elastic energies [energy] at times [time] so close together that linear interpolation is accurate enough."""
+    """How far the elastic energy is above its mean [energy], at times [time] close enough for linear interpolation."""
 
     time: Samples
-    energy: Samples
+    fluctuation: Samples
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -260,10 +260,17 @@ class ModalVibration:
 
     def separation(self, tr: Samples | float, td: Samples | float) -> Samples:
         """Return the elastic energy of the difference of the deformations at tr and td [energy]."""
-        apart = (
-            self.elastic_energy(tr) - 2 * self.overlap(tr, td) + self.elastic_energy(td)
-        )
-        return np.maximum(apart, 0.0)
+        return self.compare(tr, td)[0]
+
+    def compare(
+        self, tr: Samples | float, td: Samples | float
+    ) -> tuple[Samples, Samples]:
+        """Return `separation` and `overlap` from one evaluation [energy]."""
+        pairs = self.reading.compare(tr, td)
+        at_tr = np.maximum(pairs.elastic_energy_tr, 0.0)
+        at_td = np.maximum(pairs.elastic_energy_td, 0.0)
+        separation = np.maximum(at_tr - 2 * pairs.overlap + at_td, 0.0)
+        return separation, pairs.overlap
 
     def profile(self, td: float) -> Profile:
         """Return frozen-deformation errors at each ``time`` before ``td`` [-]; values shared by all td are cached."""
@@ -272,11 +279,8 @@ class ModalVibration:
         middle = (self.time[:last] + td) / 2
         at_td = float(self.elastic_energy(td))
         coherence = (earlier[:last] @ self.reading.later(td)).real
-        overlap = (
-            np.interp(middle, finer.time, finer.energy)
-            - self.reading.level(middle) / 2
-            + coherence / 2
-        )
+        fluctuation = np.interp(middle, finer.time, finer.fluctuation)
+        overlap = fluctuation + coherence / 2
         bound = np.sqrt(elastic[:last] * at_td)
         separation = elastic[:last] - 2 * np.clip(overlap, -bound, bound) + at_td
         return Profile(
@@ -293,10 +297,10 @@ class ModalVibration:
         finer = np.linspace(
             self.time[0], self.time[-1], _FINER * (self.time.size - 1) + 1
         )
-        course = _Course(finer, self.reading.elastic_energy(finer))
+        energy = self.reading.elastic_energy(finer)
         return (
-            np.maximum(course.energy[::_FINER], 0.0),
-            course,
+            np.maximum(energy[::_FINER], 0.0),
+            _Course(finer, energy - self.reading.level(finer) / 2),
             self.reading.earlier(self.time),
         )
 
@@ -314,11 +318,14 @@ class ModalVibration:
         side.
         """
         reading, level = self.reading, self.reading.level(td)
-        squared = reading.residual_squared(tr, td)
-        deviation = measures.BAND_DEVIATIONS * self.scatter.compute_deviation(tr, td)
+        pairs = reading.compare(tr, td)
+        squared = reading.square_residual(pairs, td)
+        scatter = self.scatter.compute_deviation(tr, td, squared)
+        deviation = measures.BAND_DEVIATIONS * scatter
+        change = (pairs.coherence - self.of_first_part.coherence(tr, td)) / level
         # The accuracy of the lines follows from the fit and from a second fit to the first part of the record.
         of_lines = np.minimum(
-            np.maximum(deviation, self._compare_with_first_part(tr, td)),
+            np.maximum(deviation, self._exceed_noise(np.abs(change), tr, td)),
             np.maximum(squared, _MOST_OPPOSED),
         )
         of_rest = _REST_COUNTS * self.noise / level * np.sqrt(self._structure_of_rest)
@@ -345,20 +352,15 @@ class ModalVibration:
             above + np.maximum(shift - room, 0.0),
         )
 
-    def _compare_with_first_part(
-        self, tr: Samples | float, td: Samples | float
+    def _exceed_noise(
+        self, change: Samples, tr: Samples | float, td: Samples | float
     ) -> Samples:
-        """Return the change of the squared residual by the lines of the first part that noise does not explain [-]."""
-        change = (
-            self.reading.coherence(tr, td) - self.of_first_part.coherence(tr, td)
-        ) / self.reading.level(td)
+        """Return by how much a ``change`` due to the lines of the first part exceeds what noise explains [-]."""
         if self._structure_of_rest > 0:
-            return np.abs(change)
-        explained = (
-            measures.BAND_DEVIATIONS
-            * self.scatter_of_first_part.compute_deviation(tr, td)
-        )
-        return np.maximum(np.abs(change) - explained, 0.0)
+            return change
+        first = self.of_first_part.residual_squared(tr, td)
+        scatter = self.scatter_of_first_part.compute_deviation(tr, td, first)
+        return np.maximum(change - measures.BAND_DEVIATIONS * scatter, 0.0)
 
     @property
     def _structure_of_rest(self) -> float:

@@ -222,7 +222,7 @@ class Vibration:
         if not isinstance(deformation, SignedAmplitudes):
             errors = measures.lock_in_error(deformation, times, self.td)
             return np.where(comparable, errors, np.inf)
-        errors, has_sign = measures.compare_signed(deformation, times, self.td)
+        errors, has_sign = measures.compare(deformation, times, self.td)
         return np.where(comparable & has_sign, errors, np.inf)
 
     def knots(self) -> Samples:
@@ -266,14 +266,15 @@ class Vibration:
         """Return the measures of comparable times (n,) as columns; for a single mode, ``td`` may be an array (n,)."""
         assert self.compared
         deformation = self.compared.deformation
+        find_tolerances: Callable[[Samples], Samples]
         if isinstance(deformation, Mode):
-            tolerance = measures.timing_tolerance(deformation, tr, td)
+            find_tolerances = partial(measures.timing_tolerance, deformation, tr, td)
         else:
             assert self.profile is not None
-            tolerance = self.profile.tolerances(
-                tr, measures.lock_in_error(deformation, tr, td)
-            )
-        return measures.measured(deformation, tr, td, tolerance, self.compared.band)
+            find_tolerances = partial(self.profile.tolerances, tr)
+        return measures.measured(
+            deformation, tr, td, find_tolerances, self.compared.band
+        )
 
 
 def find_moments(
@@ -464,7 +465,7 @@ def _compare_with_signs(whole: Vibration, basis: str, model: SignedModel) -> Vib
 
 
 def is_doubtful(whole: Vibration) -> bool:
-    """Return True if no oscillator is known, or if its misfit is so large that its sign may be wrong."""
+    """Return True if no oscillator fits, or only so badly that the sign of the deformation may be wrong."""
     return (
         not isinstance(whole.whole, OscillatorEnergy)
         or whole.whole.fit.hidden_share > SMALLEST

@@ -283,7 +283,7 @@ def make_from_mode(mode: Mode, time: Values | float) -> tuple[Oscillator, State]
 
 
 def to_mode(oscillator: Oscillator, v0: float) -> Mode:
-    """Return the vibration mode of an ``oscillator`` whose frame has the velocity ``v0`` at time 0 and all else rests.
+    """Return the vibration mode of an ``oscillator`` whose frame has velocity ``v0`` at time 0, all else being at rest.
 
     Raise RangeError if the oscillator is overdamped, because it then has no vibration to freeze, or if squares of its
     energies would overflow.

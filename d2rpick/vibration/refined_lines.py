@@ -55,7 +55,7 @@ _MOST_DECAY: Final = 8.0
 _MOST_OF_REST: Final = 3
 # Number of points per cycle over the record at which the spectrum of a misfit is evaluated.
 _FINER: Final = 2
-# Lines are searched for only above this frequency [cycles over the record]; slower changes belong to the mean.
+# Lowest frequency of an added line [cycles over the record]; slower changes are treated as part of the mean.
 _OF_MEAN: Final = 1.0
 
 

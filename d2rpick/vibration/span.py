@@ -17,8 +17,10 @@ from d2rpick.vibration.identify import (
     find_rates,
     identify,
     judge_given,
+    refuse_out_of_reach,
 )
 from d2rpick.vibration.modes import BLOCK, Mode
+from d2rpick.vibration.two_modes import shows_two_modes
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -26,6 +28,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from d2rpick.histories.history import History, Samples
+    from d2rpick.vibration.two_modes import KnownLines
 
 
 # _BEGINNINGS: trial windows begin at these distances before td, as fractions of the time from the start to td [-].
@@ -90,6 +93,8 @@ class SpanSearch(NamedTuple):
         Try only the bounds and their part up to td, because it is known that no load acts between the bounds.
     quick : bool
         Do not compute the misfit of a refused fit.
+    lines : KnownLines, optional
+        Known lines of modes. No oscillator is fitted to a window in which they show that none describes it.
     """
 
     history: History
@@ -97,10 +102,17 @@ class SpanSearch(NamedTuple):
     oscillator: Mode | None = None
     whole: bool = False
     quick: bool = False
+    lines: KnownLines | None = None
 
     def fit(self, window: Span) -> Identification:
         """Fit an oscillator to the states in a window, or compare the given oscillator with them."""
         return fit_window(self.history, window, self.oscillator, quick=self.quick)
+
+    def shows_two_modes(self, window: Span) -> bool:
+        """Return True if known lines show that no oscillator describes a window."""
+        return self.lines is not None and shows_two_modes(
+            self.history, self.lines, window
+        )
 
 
 def limit_bounds(
@@ -200,11 +212,20 @@ def find_described_span(
     for window in _list_windows_around(search.bounds, td, whole=search.whole):
         # Only the misfit of the window up to td is shown to the user.
         quickly = search.quick or window != up_to_td
+        if quickly and search.shows_two_modes(window):
+            refused[window] = _refuse_window(search.history, window)
+            continue
         span, fit = _grow_span(search._replace(quick=quickly), td, window)
         if span:
             return span, fit
         refused[window] = fit
     return None, refused[up_to_td]
+
+
+@remember
+def _refuse_window(history: History, window: Span) -> Identification:
+    """Return the refusal of a window without a fit. It is cached, so that situations can tell that they share it."""
+    return refuse_out_of_reach(history.between(*window)[0])
 
 
 @remember

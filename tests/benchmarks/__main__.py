@@ -41,6 +41,12 @@ UNSEEN = (
     *SEARCHES[1:2],
     ("explore", ("explore", "--td", "0.9", "--steps", "200"), 15.0),
 )
+# Records that are searched for modes: a random walk has none, and noisy modes are found in several windows.
+SEARCHED = (
+    ("random walk", 10_000, 3.5),
+    ("random walk", 100_000, 5.0),
+    ("noisy", 10_000, 7.5),
+)
 STARTS = (
     *(
         (("info", f"sample_data/rollover_box{kind}"), 1.5)
@@ -228,6 +234,14 @@ ROWS = (
         "--help / import click: processes",
         lambda: process_ratio("click", "--help"),
         most=1.3,
+    ),
+    *(
+        Row(
+            f"suggest --td, {kind}, {states} states / import numpy, click",
+            choosing("suggest_to_imports", kind, states),
+            most,
+        )
+        for kind, states, most in SEARCHED
     ),
     Row(
         "suggest, noise, 1e5 states / pandas.read_csv",

@@ -115,6 +115,21 @@ def open_window_to_td() -> float:
     )
 
 
+def suggest_to_imports(kind: str, states: int) -> float:
+    """Return the cost of `suggest --td`, which searches for modes, over that of importing numpy and click.
+
+    ``kind`` is "noisy" (five modes, whose windows must be found) or a name of `_make_troubled_record`.
+    """
+    if kind == "noisy":
+        file = _make_noisy_energy(states)
+    else:
+        file = _make_troubled_record(kind, states)
+    command = ("suggest", "--td", str(_TD), "--exit-zero", str(file))
+    return _compare_processes(
+        ("-m", "d2rpick", *command), ("-c", "import numpy, click")
+    )
+
+
 def explore_to_td(file: str, td: str, *options: str) -> float:
     """Return the cost of `explore` of 200 td over that of `suggest --td`; a sample, or "noisy" for 1e5 noisy states."""
     name = (

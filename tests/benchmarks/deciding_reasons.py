@@ -33,11 +33,11 @@ _NAMES: Final = {
         vibration.fitting._NO_EFFECT vibration.hidden_energy.RESOLVED
         vibration.modal._TINY vibration.modes._EPS vibration.modes.SOLVER_FLOOR vibration.modes._ZERO
         vibration.moments._ZERO vibration.moments._ROUNDING_DEVIATIONS vibration.oscillator._SMALLEST
-        vibration.oscillator._LARGEST vibration.span.SMALLEST
+        vibration.oscillator._LARGEST
         """,
     _EFFORT: """
         choice.answers._MOST_REFUSED choice.pair.candidates._MOST choice.pair.candidates._MORE
-        choice.pair.windows._EXACT choice.runs.study._STRETCHES choice.switched.comparison._BETWEEN
+        choice.pair.windows._EXACT choice.runs.study._STRETCHES choice.switched.switch_times._BETWEEN
         choice.td.suggest_td._FEWEST_TD choice.td.suggest_td._MOST_TD choice.td.trade_off._STEPS_OF_PAGE
         choice.td.trade_off._FEWEST_STEPS flight.body_frame._MOST_NODES flight.momentum._LOOK_BACK
         flight.momentum._LOOK_STATES flight.rotation._MOST_STEPS flight.rotation._SMALL
@@ -49,11 +49,12 @@ _NAMES: Final = {
         vibration.fitting._MAX_STEPS vibration.identify.HOPELESS vibration.lines._MOST_LAGS
         vibration.lines._MOST_STATES vibration.locked_lines._STRONGEST vibration.locked_lines._HARMONICS
         vibration.modal._SOME_TIMES vibration.modal_span._PARTS vibration.modes.BLOCK vibration.modes._STEPS
-        vibration.span._BEGINNINGS vibration.span._ENDS vibration.span._EARLIER_ENDS
-        vibration.span._MEANS_PER_PERIOD vibration.span._MEANS_PER_ENERGY_PERIOD vibration.span.MOST_REFITS
-        vibration.span._MOST_LINES vibration.span._FINER vibration.span._CELLS_PER_PERIOD
+        vibration.span._ENDS vibration.span._EARLIER_ENDS
+        vibration.span.MOST_REFITS
+        vibration.span._MOST_LINES vibration.span._CELLS_PER_PERIOD
         vibration.close_modes._MOST_STEPS vibration.close_modes._CONVERGED vibration.close_modes._DAMPING
         vibration.close_modes._LEAST_DAMPING vibration.close_modes._MOST_DAMPING vibration.lines.PERFECT
+        vibration.refined_lines._MOST_PARAMETERS vibration.refined_lines._MOST_OF_REST
         """,
     _WORDING: """
         choice.pair.decision._ALIKE choice.pair.quality._NAMED choice.pair.warnings._FEW_STATES
@@ -67,7 +68,7 @@ _NAMES: Final = {
         choice.health._TORN choice.health._FEWEST choice.pair.aftermath._FEWEST_STATES choice.pair.quality._BAND
         flight.margin._FEWEST flight.window.FEWEST flight.window.FEWEST_STATES_OF_WORK flight.vibrating._FEWEST
         vibration.identify.MIN_SAMPLES vibration.identify.MIN_SAMPLES_PER_PERIOD vibration.lines._EVEN
-        vibration.modal._FEWEST_STATES
+        vibration.modal.FEWEST_STATES
         """,
     _LOAD: """
         flight.contact_forces._INNER flight.contact_forces._PIECES flight.contact_forces._RISE
@@ -93,8 +94,8 @@ _NAMES: Final = {
         flight.vibrating._HARDLY
         """,
     _SWITCHED: """
-        choice.switched.comparison._OF_ANOTHER_MODEL choice.switched.comparison._EARLY
-        choice.switched.comparison.MOST_MOMENTUM_ERROR choice.switched.comparison._REPORTED_OFF
+        choice.switched.same_model._OF_ANOTHER_MODEL choice.switched.switch_times._EARLY
+        choice.switched.same_model.MOST_MOMENTUM_ERROR choice.switched.comparison._REPORTED_OFF
         choice.switched.comparison._ABOUT choice.switched.frozen._MUCH choice.switched.switched_run._HARDLY
         choice.switched.switched_run._SAME_STATES choice.td.plan._LONGER
         """,
@@ -110,16 +111,16 @@ _NAMES: Final = {
         vibration.locked_lines._EXACT_RATE vibration.locked_lines._SAME_PHASE_OF_HARMONICS
         vibration.locked_lines._THIRD_ROOM vibration.locked_lines._SAME_HEIGHT vibration.measures.BAND_DEVIATIONS
         vibration.modal._NO_STATIC vibration.modal._AMBIGUOUS vibration.modal._VAGUE_HALF
-        vibration.modal._REST_COUNTS vibration.modal._CHANCE vibration.modal._NEGATIVE_COUNTS
-        vibration.modal._BENT_ALIKE vibration.modal._BENT_ACROSS vibration.modal._SWINGING_COUNTS
-        vibration.model._OF_INTERVAL vibration.moments._DROWNED vibration.oscillator_band._HARMLESS
-        vibration.span._LEAST_PERIODS vibration.span._MOST_OF_BOUNDS vibration.swings._SWING
+        vibration.modal._SWINGING_COUNTS
+        vibration.model._OF_INTERVAL vibration.moments._DROWNED
+        vibration.span._LEAST_PERIODS vibration.swings._SWING
         vibration.swings._OFF_FLOOR vibration.swings._MOST_OFF vibration.swings._FEWEST vibration.swings._UNEVEN
         vibration.swings._MOST_BEATING vibration.swings._STRETCHED vibration.swings._OF_ANY_SPRING
         vibration.swings._OF_THE_FLOOR vibration.swings._UNRESOLVED
         vibration.close_modes._MOST_STATIC vibration.close_modes._LEAST_CHANGE vibration.close_modes._AS_WELL
         vibration.hidden_energy._LIKE_LEVEL vibration.hidden_energy._HIDDEN_LINES vibration.lines._LEAST_TURNS
         vibration.lines._SURE_TURNS vibration.modal._EXACT vibration.modal._SLOW_TOO
+        vibration.refined_lines._SAME_LINE vibration.refined_lines._MOST_DECAY vibration.refined_lines._OF_MEAN
         """,
     _FACT: """
         choice.health.MOST_HOURGLASS choice.health.MOST_IMBALANCE choice.health.MOST_SLIDING

@@ -57,6 +57,25 @@ def test_rigid_parts_do_not_gain_the_heat_of_the_flight(heat: float) -> None:
         assert decision.verdict == DO_NOT_USE
 
 
+@pytest.mark.parametrize("share", [0.5, 1.0])
+def test_the_work_of_dampers_that_remains_in_the_energy_is_no_static_change(
+    share: float,
+) -> None:
+    structure = LinearStructure(
+        np.array([1.0, 0.4]), np.array([0.1, 0.2]), np.array([9.0, 14.0]), np.zeros(2)
+    )
+    time = np.linspace(0.0, 8.0, 1601)
+    elastic = structure.elastic_energy(time)
+    whole = elastic + structure.kinetic_energy(time)
+    history = make_energy_history(elastic + share * (whole[0] - whole), time)
+    suggestion = suggest_in_history(history, float(time[-2]), SETTINGS)
+    chosen = require(suggestion.chosen)
+    change = require(compute_static_change(suggestion.situation, chosen))
+    assert change == pytest.approx(0.0, abs=0.01)
+    decision = require(suggestion.decision)
+    assert "between tr and td" not in decision.reason
+
+
 def test_an_energy_below_zero_is_never_used_whatever_describes_it() -> None:
     """Each oscillation is counted, but an internal energy cannot be negative: another column was read."""
     time = np.linspace(0.0, 0.4, 401)

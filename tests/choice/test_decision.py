@@ -7,7 +7,15 @@ import pytest
 import d2rpick as d2
 from d2rpick.choice.pair.aftermath import MeanEnergyBounds
 from d2rpick.choice.pair.grades import DO_NOT_USE, GRADES, VERDICTS
-from tests.command import ENERGY, GLSTAT, MATSUM, ROOT, run_json
+from tests.command import (
+    ENERGY,
+    GLSTAT,
+    MATSUM,
+    ROOT,
+    join_wrapped_lines,
+    run,
+    run_json,
+)
 from tests.energies import require
 
 RUNS = [(ENERGY, ()), (GLSTAT, ()), (MATSUM, ("--part", "flying"))]
@@ -43,7 +51,10 @@ def test_all_commands_give_one_verdict_on_a_pair(
     [
         ((0.33, 0.34), "it will refuse that run by its mean energy; to accept it"),
         ((1.4, 7.1), "it will refuse that run by its mean energy)"),
-        ((0.58, 7.1), "(d2rpick verify accepts 70% to 130% of a switched run)"),
+        (
+            (0.58, 7.1),
+            "(d2rpick verify accepts 70% to 130% of a switched run, so only the comparison shows",
+        ),
         ((0.8, 1.2), "mean energy after td 80% to 120% of the reference run"),
     ],
 )
@@ -127,3 +138,38 @@ def test_a_notebook_shows_reason_and_cure_with_every_verdict() -> None:
     ):
         shown = unescape(answer._repr_html_())
         assert all(text and text in shown for text in texts)
+
+
+@pytest.mark.parametrize("td", [0.258462, 0.355385])
+def test_the_next_contact_does_not_excuse_an_error_that_makes_a_pair_inadmissible(
+    td: float,
+) -> None:
+    """The verdict on a pair, and the grade of its vibration, are one grade, and the reason is the one that decides."""
+    answer = d2.suggest(d2.read(MATSUM), td, parts="1,2")
+    refused = 0
+    for candidate in answer.candidates:
+        decision = answer.decision_on(candidate)
+        quality = decision.quality
+        if decision.objections:
+            continue
+        assert decision.grade == quality.grade
+        is_small = quality.worth is not None and quality.worth.share <= 0.05
+        if is_small and not candidate.admissible:
+            refused += 1
+            assert quality.vibration.grade == quality.alone.grade == "poor"
+            decisive = "d2rpick accepts no such pair, even if the error hardly matters"
+            assert decisive in decision.reason
+            assert " more than 1" in decision.reason
+    assert refused
+
+
+def test_verify_gives_the_reason_that_decides_and_one_grade() -> None:
+    times = ("--tr", "0.257499", "--td", "0.355385")
+    judged = run_json("verify", "--part", "1,2", *times, MATSUM)
+    text = join_wrapped_lines(run("verify", "--part", "1,2", *times, MATSUM).stdout)
+    assert "vibration poor; the energy of its error is at most 4.48%" in text
+    assert judged["vibration"] == judged["quality"] == "poor"
+    assert judged["verdict_reason"].endswith(
+        "residual 1.127, more than 1, the residual of a release without any vibration: d2rpick accepts no such pair, "
+        "even if the error hardly matters in the next contact"
+    )

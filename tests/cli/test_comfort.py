@@ -213,7 +213,9 @@ def test_a_deck_in_s_is_not_judged_by_a_history_in_ms(in_ms: str) -> None:
     result = run("check", str(ROOT / "sample_data/switching.k"), "--history", in_ms)
     assert result.exit_code == 1
     assert "error D2R207" in result.stdout  # one finding per mistake
-    assert "about 1000 times earlier: seconds for milliseconds" in result.stdout
+    assert (
+        "they are about 1000 times smaller: seconds for milliseconds" in result.stdout
+    )
     assert "1 error, 0 warnings" in result.stdout
 
 

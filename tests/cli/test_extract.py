@@ -26,6 +26,8 @@ from tests.command import (
     run,
     run_json,
 )
+from tests.computed import locate_stored
+from tests.energies import require
 from tests.reading import read_history
 
 SUFFIXES = ["csv", "h5", "hdf5"]
@@ -149,6 +151,39 @@ def test_a_table_of_some_parts_has_the_verdict_of_its_run(
     for key in ("verdict", "verdict_reason", "basis", "recommended"):
         assert answers[0][key] == answers[1][key], key
     assert "also make part 2 rigid" in answers[1]["cure"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("suffix", ["csv", "h5"])
+def test_a_table_of_parts_on_springs_has_the_flight_of_its_run(
+    suffix: str, tmp_path: Path
+) -> None:
+    """The dampers of the springs change the energy of the chosen parts, which does not show a load on the car."""
+    table = str(tmp_path / f"car.{suffix}")
+    source = ("--part", "1-14", locate_stored("carT01.gz"))
+    assert run("extract", *source, "-o", table).exit_code == 0
+    td = ("suggest", "--td", "0.1463")
+    of_run, of_table = run_json(*td, *source), run_json(*td, table)
+    for key in ("start", "end", "source"):
+        assert of_table["flight"][key] == of_run["flight"][key]
+    assert of_table["recommended"]["tr"] == of_run["recommended"]["tr"]
+    for key in ("verdict", "verdict_reason", "cure", "basis"):
+        assert of_table[key] == of_run[key], key
+
+
+def test_springs_of_a_table_are_not_proposed_as_rigid(tmp_path: Path) -> None:
+    columns = {
+        "time": np.linspace(0, 1, 50),
+        "internal_energy": 3 + np.sin(40 * np.linspace(0, 1, 50)),
+        "not_chosen_part_2": np.linspace(1, 2, 50),
+        "not_chosen_spring_15": np.linspace(3, 7, 50),
+    }
+    file = put(tmp_path / "parts.csv", write_table("csv", columns))
+    evidence = read_history([str(file)]).evidence
+    assert [part.id for part in evidence.not_chosen] == [2, 15]
+    assert [part.id for part in evidence.springs] == [15]
+    energies = require(evidence.internal_energies(evidence.not_chosen))
+    np.testing.assert_array_equal(energies.values[[0, -1]], [[1, 3], [2, 7]])
 
 
 def test_a_table_of_all_parts_that_vibrate_leaves_out_none(tmp_path: Path) -> None:

@@ -105,3 +105,12 @@ def test_a_mistyped_run_to_follow_is_compared_with_its_neighbours(
     assert "(did you mean 'run_a'?)" in answer.stdout
     assert "exit code 1: the parts do not fly" in answer.stderr
     assert "did you mean" not in run("follow", "--once", str(tmp_path / "run_a")).stdout
+
+
+def test_a_main_node_that_the_deck_lacks_is_refused_with_those_it_has() -> None:
+    folder = str(ROOT / "sample_data" / "oscillator")
+    answer = run("plan", "-f", "card", "--node", "1001", folder)
+    assert answer.exit_code == 2
+    assert "no rigid body has the main node 1001" in answer.stderr
+    assert "as --node: the deck has 9001" in answer.stderr
+    assert run("plan", "-f", "card", "--node", "9001", folder).exit_code == 0

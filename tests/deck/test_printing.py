@@ -86,7 +86,7 @@ def test_a_number_too_wide_is_refused() -> None:
     [
         ([], "no window"),
         ([(0.09, 0.02)], "0 <= tr < td"),
-        ([(0.02, 0.02)], "0 <= tr < td"),
+        ([(0.02, 0.02)], "tr and td are both 0.02; give a td after tr"),
         ([(-1.0, 1.0)], "0 <= tr < td"),
         ([(0.0, float("inf"))], "0 <= tr < td"),
         ([(0.02, float("nan"))], "0 <= tr < td"),

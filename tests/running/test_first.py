@@ -130,7 +130,7 @@ def test_the_check_says_that_it_does_not_know_these_times(tmp_path: Path) -> Non
         (
             CONTACT,
             {"parts": None},
-            r"deactivates no rigid body \(/RBODY/OFF\); name them with `parts`",
+            r"deactivates no rigid body \(/RBODY/OFF\); name those to be switched with `parts`",
         ),
     ],
 )

@@ -20,13 +20,15 @@ def test_the_deviation_is_that_of_many_noisy_records(seed: int, noise: float) ->
     structure = LinearStructure.draw(seed, 2)
     energy = structure.elastic_energy(TIME)
     random = np.random.default_rng(seed)
-    true = structure.residual(*PAIRS) ** 2
+    tr, td = PAIRS
+    true = structure.residual(tr, td) ** 2
     errors, deviations = [], []
     for _ in range(RECORDS):
         scatter = noise * np.ptp(energy) * random.standard_normal(TIME.size)
         modal = require(identify_modal(TIME, energy + scatter))
-        errors.append(modal.reading.residual_squared(*PAIRS) - true)
-        deviations.append(modal.scatter.compute_deviation(*PAIRS))
+        squared = modal.reading.residual_squared(tr, td)
+        errors.append(squared - true)
+        deviations.append(modal.scatter.compute_deviation(tr, td, squared))
     measured = np.sqrt(np.mean(np.square(errors)))
     expected = np.sqrt(np.mean(np.square(deviations)))
     assert 0.5 < expected / measured < 2.0
@@ -35,7 +37,9 @@ def test_the_deviation_is_that_of_many_noisy_records(seed: int, noise: float) ->
 def test_a_record_without_scatter_has_no_deviation() -> None:
     structure = LinearStructure.draw(5, 3)
     modal = require(identify_modal(TIME, structure.elastic_energy(TIME)))
-    assert modal.scatter.compute_deviation(*PAIRS).max() < 1e-4
+    tr, td = PAIRS
+    squared = modal.reading.residual_squared(tr, td)
+    assert modal.scatter.compute_deviation(tr, td, squared).max() < 1e-4
 
 
 def test_a_later_td_is_known_less_where_the_vibration_decays() -> None:
@@ -43,5 +47,7 @@ def test_a_later_td_is_known_less_where_the_vibration_decays() -> None:
     energy = structure.elastic_energy(TIME)
     scatter = 0.01 * np.ptp(energy) * np.random.default_rng(0).standard_normal(901)
     modal = require(identify_modal(TIME, energy + scatter))
-    early, late = modal.scatter.compute_deviation(0.5, np.array([2.0, 8.0]))
+    td = np.array([2.0, 8.0])
+    squared = modal.reading.residual_squared(0.5, td)
+    early, late = modal.scatter.compute_deviation(0.5, td, squared)
     assert late > 2 * early

@@ -43,7 +43,7 @@ def test_each_measure_has_a_column() -> None:
         mode,
         tr,
         paper.TD,
-        tr,
+        lambda _: tr,
         lambda error, *_: (error, error - 0.1, error + 0.1),
     )
     assert (*columns,) == measures.Measured._fields
@@ -71,7 +71,14 @@ def test_the_timing_tolerance_is_where_the_error_has_grown(
 ) -> None:
     td = tr + window
     assume(float(mode.vibration_energy(td)) > 1e-6)
-    tolerance = float(measures.timing_tolerance(mode, np.array([tr]), td)[0])
+    tolerance = float(
+        measures.timing_tolerance(
+            mode,
+            np.array([tr]),
+            td,
+            measures.lock_in_error(mode, np.array([tr]), td),
+        )[0]
+    )
     lock_in_at_tr = float(measures.lock_in_error(mode, tr, td))
     grown = lock_in_at_tr + measures.TOLERATED_GROWTH
     inside = np.linspace(tr - tolerance, tr + tolerance, 501)[1:-1]

@@ -63,7 +63,14 @@ def find_tolerance(profile: Profile, tr: float, error: float) -> float:
 @pytest.mark.parametrize("tr", [0.3, 1.11, 2.75, 4.0])
 def test_the_tolerance_is_that_of_the_closed_form(tr: float) -> None:
     error = float(measures.lock_in_error(MODE, tr, TD))
-    expected = float(measures.timing_tolerance(MODE, np.array([tr]), TD)[0])
+    expected = float(
+        measures.timing_tolerance(
+            MODE,
+            np.array([tr]),
+            TD,
+            measures.lock_in_error(MODE, np.array([tr]), TD),
+        )[0]
+    )
     assert find_tolerance(PROFILE, tr, error) == pytest.approx(expected, abs=1e-3)
 
 

@@ -18,7 +18,7 @@ from d2rpick.models.box_run import (
     make_history,
     simulate,
 )
-from validation.published.exhibits import Curve, Exhibit, Panel, Shape
+from validation.published.exhibits import RUNS, Curve, Exhibit, Panel, Shape
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -383,8 +383,8 @@ def _describe_outcome(trial: Trial) -> str:
         for place_number, result_of_variant in enumerate(rows, start=1)
     )
     fails = "" if trial.kept else (
-        "It fails for all of them at once: no tr lies within the timing tolerance of each run, so that no error grows "
-        "by more than 0.05. "
+        "The statement fails for all runs together: no tr lies within the timing tolerance of every run, so in some "
+        "run the error grows by more than 0.05. "
     )  # fmt: skip
     return (
         f"True for what acts after td: tr moves by {max(later) - min(later):.2g} ms. What acts before td moves it: "
@@ -394,7 +394,7 @@ def _describe_outcome(trial: Trial) -> str:
         f"{worst.level_error:.3f} ({worst.variant.name}), with a tolerance of 0.2; switched there, the roll at td is "
         f"right within {roll:.2f} degrees, and up to {given_up:.1f} ms of about {rigid:.0f} are given up. "
         "A tr that is taken over must lie after the end of the load of every run, which is "
-        f"between {min(loads):.1f} and {max(loads):.1f} ms. Runs: {names}."
+        f"between {min(loads):.1f} and {max(loads):.1f} ms. {RUNS} {names}."
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import cycle
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -11,9 +12,10 @@ from matplotlib.ticker import MaxNLocator
 
 from d2rpick.models.box_model import Parameters, build_structure
 from d2rpick.report.figures import (
-    FLIGHT,
-    GOOD,
+    BETTER,
+    NEUTRAL,
     REFERENCE,
+    RIGID_OPACITY,
     SWITCHED,
     format_axes,
     make_logarithmic,
@@ -22,15 +24,17 @@ from d2rpick.report.figures_models import draw_sled
 from d2rpick.report.view import BELOW_LEVEL, LOGARITHMIC
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Mapping, Sequence
 
     from matplotlib.axes import Axes
 
     from d2rpick.histories.history import Samples
     from validation.published.exhibits import Exhibit, Panel
 
-# Okabe and Ito's palette goes on.
-_COLOURS = (REFERENCE, SWITCHED, GOOD, FLIGHT, "#cc79a7", "#e69f00")
+# Colours of the curves of an exhibit, by their order: the reference run is black, the first switched run orange.
+_COLOURS = (REFERENCE, SWITCHED, BETTER, "#882255", "#44aa99", "#999933")
+# Dashes of the times that are marked in a panel.
+_DASHES: Final = ("--", ":", "-.")
 _STYLES: Final[Mapping[str, dict[str, Any]]] = {
     "line": {"linewidth": 1}, "thin": {"linewidth": 0.6, "linestyle": "--"}, "dots": {"linestyle": "", "marker": "."},
 }  # fmt: skip
@@ -51,14 +55,29 @@ def draw_exhibit(exhibit: Exhibit) -> Figure:
         figsize=(9 if columns == 1 else 5.2 * columns, 3.4 * rows), layout="constrained"
     )
     grid = figure.subplots(rows, columns, squeeze=False)
-    for axes, panel in zip(
-        grid.flat, (panel for row in exhibit.panels for panel in row), strict=True
-    ):
-        _draw_panel(axes, panel, exhibit.columns)
+    panels = [panel for row in exhibit.panels for panel in row]
+    colours = _choose_colours(panels)
+    for axes, panel in zip(grid.flat, panels, strict=True):
+        _draw_panel(axes, panel, exhibit.columns, colours)
     return figure
 
 
-def _draw_panel(axes: Axes, panel: Panel, columns: Mapping[str, Samples]) -> None:
+def _choose_colours(panels: Sequence[Panel]) -> dict[str, str]:
+    """Return the colour of each label, so that a run has one colour in all panels of an exhibit."""
+    labels: list[str] = []
+    for panel in panels:
+        labels += [shape.label for shape in panel.shapes]
+        labels += [curve.label for curve in panel.curves]
+    distinct_labels = dict.fromkeys(filter(None, labels))
+    return dict(zip(distinct_labels, cycle(_COLOURS), strict=False))
+
+
+def _draw_panel(
+    axes: Axes,
+    panel: Panel,
+    columns: Mapping[str, Samples],
+    colours: Mapping[str, str],
+) -> None:
     drawn = dict.fromkeys(_STYLES, 0)
     for curve in panel.curves:
         x, y = (
@@ -75,14 +94,17 @@ def _draw_panel(axes: Axes, panel: Panel, columns: Mapping[str, Samples]) -> Non
             x[shown_points],
             y[shown_points],
             label=label,
-            color=_COLOURS[drawn[curve.style]],
+            color=colours.get(curve.label or "", _COLOURS[drawn[curve.style]]),
             **_STYLES[curve.style],
         )
         drawn[curve.style] += 1
-    for shape, colour in zip(panel.shapes, _COLOURS, strict=False):
+    for shape in panel.shapes:
         closed = np.column_stack([shape.outlines, shape.outlines[:, 0]]).T
         lines = axes.plot(
-            closed.real, closed.imag, color=colour, **_STYLES[shape.style]
+            closed.real,
+            closed.imag,
+            color=colours[shape.label],
+            **_STYLES[shape.style],
         )
         lines[0].set_label(shape.label)
         axes.set_aspect("equal")
@@ -97,21 +119,31 @@ def _draw_panel(axes: Axes, panel: Panel, columns: Mapping[str, Samples]) -> Non
     ):
         axes.margins(x=0.1, y=0.1)  # single runs, which would stand on the edges
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    if axes.get_legend_handles_labels()[0]:
+    if panel.shapes:
+        # Outlines fill the panel, so that a legend inside would hide some of them.
+        axes.margins(0.06)
+        axes.legend(
+            fontsize="x-small", loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=3
+        )
+    elif axes.get_legend_handles_labels()[0]:
         axes.legend(fontsize="x-small", loc="best")
 
 
 def _draw_marks(axes: Axes, panel: Panel) -> None:
     for name, level in panel.levels:
         axes.axhline(level, color=SWITCHED, linewidth=0.8, label=name)
-    for mark_index, (name, x) in enumerate(panel.marks):
-        axes.axvline(
-            x, color=_COLOURS[2 + mark_index], linestyle="--", linewidth=1, label=name
-        )
+    for (name, x), dashes in zip(panel.marks, cycle(_DASHES), strict=False):
+        axes.axvline(x, color=NEUTRAL, linestyle=dashes, linewidth=1, label=name)
     for x, y in panel.points:
-        axes.plot(x, y, "o", color=GOOD, markersize=5)
+        axes.plot(x, y, "o", color=SWITCHED, markersize=5)
     if panel.rigid:
-        axes.axvspan(*panel.rigid, color=FLIGHT, alpha=0.2, linewidth=0, label="rigid")
+        axes.axvspan(
+            *panel.rigid,
+            color=NEUTRAL,
+            alpha=RIGID_OPACITY,
+            linewidth=0,
+            label="rigid",
+        )
 
 
 def _show(axes: Axes, panel: Panel, columns: Mapping[str, Samples]) -> None:
@@ -143,7 +175,7 @@ def box(axes: Axes) -> None:
     draw_sled(axes, parameters, 0.0)
     for truss, colour, width in (
         (structure.box, REFERENCE, 0.4),
-        (structure.step, GOOD, 1.2),
+        (structure.step, BETTER, 1.2),
     ):
         for first_node, second_node in structure.places[truss.ends]:
             axes.plot(
@@ -196,9 +228,9 @@ def elements(axes: Axes) -> None:
                 (1.0 + 0.2 * number, 0.55),
                 0.2,
                 0.2,
-                facecolor=FLIGHT,
+                facecolor=NEUTRAL,
                 edgecolor=REFERENCE,
-                alpha=0.6,
+                alpha=RIGID_OPACITY,
             )
         )
     _draw_block(axes, 0.0, "m")

@@ -38,6 +38,10 @@ VERDICTS: Final = ("yes", "in part", "no", "nothing to compare")
 YES, IN_PART, NO, NOTHING = VERDICTS
 
 
+# Word before the list of runs at the end of what an exhibit shows.
+RUNS: Final = "Runs:"
+
+
 class Curve(NamedTuple):
     """Column drawn as "line", "thin" or "dots" over the column ``x`` (default: the first one)."""
 

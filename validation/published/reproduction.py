@@ -16,7 +16,7 @@ from d2rpick.report.page import (
     make_element,
 )
 from validation.published.drawing import draw_exhibit
-from validation.published.exhibits import IN_PART, NO, NOTHING, VERDICTS, YES
+from validation.published.exhibits import IN_PART, NO, NOTHING, RUNS, VERDICTS, YES
 from validation.published.values import (
     MISPRINTS,
     MOST_DIFFERENCE,
@@ -48,10 +48,14 @@ HEAD = (
 
 # Columns of the values of one figure, without their source: it stands once below them.
 _VALUES: Final = HEAD[:-1]
+# Heading of the published and of the better pair.
+_PAIRS: Final = (
+    "Switch times: the published pair, and the pair at the next peak of the energy"
+)
 # Section of the paper with the equations that have misprints, and the one that chooses the pair.
 _EQUATIONS: Final = 2
 _CHOICE: Final = 4
-_OVERVIEW: Final = ("figure", "the paper shows", "the same here")
+_OVERVIEW: Final = ("figure", "the paper shows", "agrees")
 
 
 class Reproduction(NamedTuple):
@@ -149,10 +153,12 @@ def as_table(answer: Reproduction, shown: DisplayOptions) -> str:
     ]
     blocks = [tables.as_text(_OVERVIEW, overview, shown.width)]
     for exhibit in answer.exhibits:
+        found, _, runs = exhibit.found.partition(f" {RUNS} ")
         lines = [
             f"{write_heading(exhibit)}: {exhibit.verdict}",
             f"  paper  {exhibit.paper}",
-            f"  here   {exhibit.found}",
+            f"  here   {found}",
+            *([f"  runs   {runs}"] if runs else []),
         ]
         if rows := answer.list_values(exhibit):
             body = [list_cells(row)[:-1] for row in rows]
@@ -160,7 +166,7 @@ def as_table(answer: Reproduction, shown: DisplayOptions) -> str:
             lines += [f"sources  {'; '.join(list_sources(rows))}"]
         blocks.append("\n".join(lines))
     if answer.pairs:
-        blocks.append("\n".join(answer.pairs))
+        blocks.append("\n".join([_PAIRS, *(f"  {pair}" for pair in answer.pairs)]))
     if answer.misprints:
         listed = (f"  {misprint}" for misprint in answer.misprints)
         blocks.append("\n".join(["misprints in the paper", *listed]))
@@ -191,7 +197,9 @@ def as_markdown(
         ]
         if rows := answer.list_values(exhibit):
             blocks.append(tables.as_markdown(HEAD, [list_cells(row) for row in rows]))
-    blocks += answer.pairs
+    if answer.pairs:
+        listed = "\n".join(f"* {pair}" for pair in answer.pairs)
+        blocks += [f"## {_PAIRS}", listed]
     if answer.misprints:
         listed = "\n".join(f"* {misprint}" for misprint in answer.misprints)
         blocks += ["## Misprints in the paper", listed]
@@ -219,12 +227,12 @@ def as_csv(answer: Reproduction, _: DisplayOptions) -> str:
 
 
 def list_cells(row: PublishedValue) -> list[tables.Cell]:
-    """Give a row in digits that are the same on every machine."""
+    """Give a row in six digits, which are the same on every machine; the CSV file has all digits."""
     known = (
-        None if value is None else f"{round(value, _DECIMALS):.12g}"
+        None if value is None else f"{round(value, _DECIMALS):.6g}"
         for value in (row.published, row.reference)
     )
-    here = f"{round(row.here, _DECIMALS):.12g}"
+    here = f"{round(row.here, _DECIMALS):.6g}"
     difference = (
         "0"
         if abs(row.difference) < MOST_DIFFERENCE * abs(row.expected)

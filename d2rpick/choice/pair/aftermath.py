@@ -12,6 +12,7 @@ and thereby of S.
 
 from __future__ import annotations
 
+from math import copysign, sqrt
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -23,7 +24,7 @@ from d2rpick.choice.pair.warnings import (
     select_energies_in_flight,
 )
 from d2rpick.flight.margin import compute_energy_of_approach
-from d2rpick.vibration.measures import wrong_sign
+from d2rpick.vibration.measures import BAND_DEVIATIONS, wrong_sign
 
 if TYPE_CHECKING:
     from d2rpick.choice.pair.candidates import Candidate
@@ -145,25 +146,43 @@ def _bound_vibration_energies(
 def compute_static_change(situation: Situation, candidate: Candidate) -> float | None:
     """Return by how much the static energy changes from tr to td, relative to the mean energy after td [-].
 
-    It is the smallest change that the bounds of the vibration energy allow; 0 if they have different signs. It is None
-    if the vibration energy at tr or the mean energy is unknown, or if nothing vibrates.
+    It is the smallest change that the bounds of the vibration energy allow; 0 if they have different signs. A rise by
+    what damping takes from the vibration is no change: the dampers' work remains in the internal energy. Neither is a
+    change that may be noise. The result is None if the vibration energy at tr or the mean energy is unknown, or if
+    nothing vibrates.
     """
     if situation.at_rest:
         return None
     changes = []
+    damped = _compute_damped_energy(situation, candidate.tr)
+    modal = situation.vibration.modal
+    # The energies at tr and td each have the noise of the record.
+    scatter = 0.0 if modal is None else sqrt(2) * BAND_DEVIATIONS * modal.noise
     for vibration in _bound_vibration_energies(situation, candidate.tr):
         static_td = max(situation.energy_td - vibration.elastic_td, 0.0)
         mean = static_td + vibration.whole / 2
         if vibration.elastic_tr is None or not mean > 0:
             return None
-        changes.append(
-            (static_td - max(candidate.energy - vibration.elastic_tr, 0.0)) / mean
-        )
+        static_tr = max(candidate.energy - vibration.elastic_tr, 0.0)
+        rise = static_td - static_tr
+        change = max(rise - damped, min(rise, 0.0))
+        changes.append(copysign(max(abs(change) - scatter, 0.0), change) / mean)
     if not changes:
         return None
     if min(changes) < 0 < max(changes):
         return 0.0
     return min(changes, key=abs)
+
+
+def _compute_damped_energy(situation: Situation, tr: float) -> float:
+    """Return the energy that damping takes from the vibration between tr and td [energy]; 0 if it is unknown."""
+    vibration = situation.vibration
+    if vibration.compared is None or not vibration.comparable(np.array(tr)):
+        return 0.0
+    energies = vibration.compared.deformation.vibration_energy(
+        np.array([tr, situation.td])
+    )
+    return max(float(energies[0] - energies[1]), 0.0)
 
 
 def bound_vibration_energy(situation: Situation) -> tuple[float, float] | None:

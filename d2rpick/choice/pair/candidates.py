@@ -484,7 +484,7 @@ def _mark_given_as_matches(situation: Situation, moments: Moments) -> Moments:
 def _select_distinct(situation: Situation, moments: Moments) -> Moments:
     """Return the moments in time order, without closest matches next to a crossing or an extremum."""
     matches = moments.are("match")
-    if matches.any():
+    if matches.any() and not matches.all():
         is_distinct = ~matches
         of_level = moments.tr[~matches]
         for row in np.flatnonzero(matches).tolist():

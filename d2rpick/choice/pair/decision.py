@@ -23,6 +23,7 @@ from d2rpick.choice.pair.quality import (
     MOST_WORTH_OF_FAIR,
     MOST_WORTH_OF_GOOD,
     grade_pair,
+    refuse_error,
 )
 from d2rpick.vibration.measures import wrong_sign
 
@@ -51,6 +52,12 @@ _USE_BEST: Final = (
 _AVOID_BEST: Final = "choose another flight, or make other parts rigid"
 # _USE_COMPARED: the advice that replaces _USE_BEST if a switched run has been compared.
 _USE_COMPARED: Final = "use this pair if only the motion matters"
+# _MORE_OFTEN: beginning of the advice on too few states per period.
+# _RUN_LONGER: advice if the flight goes on after the end of the record.
+_MORE_OFTEN: Final = "write the energies more often, at least"
+_RUN_LONGER: Final = (
+    ", where the record ends in the flight (a longer run may allow a better pair)"
+)
 # The worst case is shown if its residual exceeds the expected residual by more than this [-].
 _ALIKE: Final = 5e-3
 
@@ -82,6 +89,8 @@ class Decision(NamedTuple):
         Advice on how to remove the objections if there is no better pair.
     best_of : (float, float) or None
         Range of td in which this pair is the best [time]; None if not all td of the range were compared.
+    ends_in_flight : bool
+        True if the record ends before the next contact.
     is_compared : bool
         True if a finished switched run was compared with the reference run.
     """
@@ -97,6 +106,7 @@ class Decision(NamedTuple):
     better_level: float | None = None
     cure_of_objections: str = CHOOSE_ANOTHER
     best_of: tuple[float, float] | None = None
+    ends_in_flight: bool = False
     is_compared: bool = False
 
     @property
@@ -148,9 +158,6 @@ class Decision(NamedTuple):
         """Reason for the verdict."""
         if self.objections:
             return "; ".join(self.objections)
-        if self.grade == POOR and self.quality.grade != POOR:
-            # The error makes the pair inadmissible, however little it affects the next contact.
-            return "; ".join(self.quality.alone.reasons)
         if self.at_rest and not self.quality.reasons:
             return "nothing vibrates in the flight up to td"
         reasons = "; ".join(self.quality.reasons)
@@ -165,9 +172,6 @@ class Decision(NamedTuple):
         """Reason for a verdict other than "use", without numbers, so that several pairs can share the reason."""
         if self.objections:
             return "; ".join(self.objections)
-        if self.grade == POOR and self.quality.grade != POOR:
-            causes = self.quality.alone.causes
-            return "; ".join(cause.general_reason for cause in causes)
         reasons = "; ".join(cause.general_reason for cause in self.quality.causes)
         if self.is_limited_by_raised_grade:
             limit = (
@@ -218,7 +222,9 @@ class Decision(NamedTuple):
             )
         if low > limits.high:
             return f" ({accepted}, so it will refuse that run by its mean energy)"
-        return f" ({accepted})"
+        return (
+            f" ({accepted}, so only the comparison shows whether it accepts that run)"
+        )
 
     @property
     def worst_case(self) -> str:
@@ -261,7 +267,8 @@ class Decision(NamedTuple):
         low, high = self.best_of
         usable = _USE_COMPARED if self.is_compared else _USE_BEST
         advice = _AVOID_BEST if self.grade == POOR else usable
-        return f"no clearly better pair was found for td from {low:.6g} to {high:.6g}: {advice}"
+        longer = _RUN_LONGER if self.ends_in_flight else ""
+        return f"no clearly better pair was found for td from {low:.6g} to {high:.6g}{longer}: {advice}"
 
 
 def join_cures(cures: Iterable[str]) -> str:
@@ -273,6 +280,9 @@ def join_cures(cures: Iterable[str]) -> str:
     'write more often, with more digits; give the deck'
     """
     listed = [*dict.fromkeys(cures)]
+    if any(cure.startswith("write the energies every") for cure in listed):
+        # A cure with an interval makes one without an interval superfluous.
+        listed = [cure for cure in listed if not cure.startswith(_MORE_OFTEN)]
     return "; ".join(
         cure
         for cure in listed
@@ -285,22 +295,23 @@ def decide(
     candidate: Candidate,
     *,
     objections: Sequence[str] = (),
+    errors: Sequence[str] = (),
     better: Pair | None = None,
     cure_of_objections: str = CHOOSE_ANOTHER,
     best_of: tuple[float, float] | None = None,
-    is_admissible: bool = True,
     best_residual: float | None = None,
 ) -> Decision:
     """Return the verdict on a tr, which any of the ``objections`` makes inadmissible; ``better`` is a better pair.
 
-    ``is_admissible`` is False for a pair without ``objections`` that is inadmissible only because its residual is too
-    large. ``best_residual`` is the residual of the best tr at this td [-]: if it is clearly smaller, the verdict blames
-    tr. If there is no better pair, ``cure_of_objections`` is the advice on the objections. ``best_of`` is the range of
-    td in which the pair is the best [time], if all td of the range were compared.
+    ``errors`` are further objections, which repeat that the residual is too large. ``best_residual`` is the residual of
+    the best tr at this td [-]: if it is clearly smaller, the verdict blames tr. If there is no better pair,
+    ``cure_of_objections`` is the advice on the objections. ``best_of`` is the range of td in which the pair is the best
+    [time], if all td of the range were compared.
     """
     quality = grade_pair(situation, candidate, best_residual)
+    quality = refuse_error(quality, errors)
     return Decision(
-        grade=quality.grade if is_admissible and not objections else POOR,
+        grade=POOR if errors or objections else quality.grade,
         quality=quality,
         objections=tuple(objections),
         at_rest=situation.at_rest,
@@ -311,6 +322,8 @@ def decide(
         better_level=_compare_levels(situation, better),
         cure_of_objections=cure_of_objections,
         best_of=best_of,
+        ends_in_flight=situation.flight.start is not None
+        and situation.flight.end is None,
     )
 
 

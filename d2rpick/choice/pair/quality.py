@@ -472,6 +472,22 @@ def _raise_grade_by_worth(alone: Grade, worth: Worth | None) -> Grade:
     return Grade("fair", alone.causes)
 
 
+def refuse_error(quality: Quality, errors: Sequence[str]) -> Quality:
+    """Return the grades of a pair that its ``errors`` make inadmissible, however little they affect the next contact.
+
+    Nothing changes unless the next contact has raised the grade of the vibration.
+    """
+    alone = quality.alone
+    if not errors or quality.vibration.grade == alone.grade:
+        return quality
+    first, *others = alone.causes
+    refusal = "d2rpick accepts no such pair, even if the error hardly matters in the next contact"
+    reason = f"{first.reason}; {'; '.join(errors)}: {refusal}"
+    cause = first._replace(reason=reason)
+    refused = alone._replace(causes=(cause, *others))
+    return quality._replace(vibration=refused, alone=refused)
+
+
 def _list_causes_for_poor(
     situation: Situation, best: Candidate, best_residual: float | None
 ) -> list[Cause]:
@@ -564,13 +580,16 @@ def _describe_cure_for_modes(situation: Situation) -> str:
     It is empty if all other vibrating parts are springs or the like, whose energy a choice of parts would not add.
     """
     other_parts = situation.parts_to_add
+    others_are_springs = bool(situation.together.not_chosen.parts) and not other_parts
+    if others_are_springs:
+        return ""
     if situation.history.parts is None and not other_parts:
         return f"{NAME_PARTS}, if the files contain parts"
     if other_parts:
         names = list_names([part.name for part in other_parts], most=_NAMED)
         vibrates = "it vibrates" if len(other_parts) == 1 else "they vibrate"
         return f"also make {names} rigid, because {vibrates} together with the chosen parts"
-    return "" if situation.together.not_chosen.parts else MORE_OFTEN
+    return MORE_OFTEN
 
 
 def _describe_wrong_tr(

@@ -28,7 +28,14 @@ from d2rpick.vibration.model import (
     is_doubtful,
     model_at,
 )
-from d2rpick.vibration.span import Span, SpanSearch, find_oscillator, limit_bounds
+from d2rpick.vibration.span import (
+    Span,
+    SpanSearch,
+    find_longest_described,
+    find_oscillator,
+    limit_bounds,
+)
+from d2rpick.vibration.two_modes import KnownLines
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -298,6 +305,7 @@ def examine_td(
     seen = find_seen_flight(history, td)
     fitted_at = _choose_time_of_fit(seen, td)
     is_shown = seen.flight is not None or seen.refusal is not None
+    is_given = settings.oscillator is not None or settings.fit_window is not None
     span: Span | None = None
     fit: Identification | None = None
     if settings.replay:
@@ -307,19 +315,16 @@ def examine_td(
         search = SpanSearch(
             history, bounds, settings.oscillator, whole=is_shown, quick=quick
         )
+        if not (is_shown or is_given):
+            search = search._replace(lines=_find_known_lines(search, td))
         span, fit = find_oscillator(search, fitted_at, settings.fit_window)
     described = _skip_first_quarter(history, fit, span)
     quiet: QuietTime | None = None
-    is_given = settings.oscillator is not None or settings.fit_window is not None
     if not (is_shown or _covers_most(history, described) or (described and is_given)):
         # The time without loads is needed if only the energy shows a flight, or if no fit covers most of the record.
         quiet = find_quiet_time(history, td)
         if settings.replay:
-            # Imported here to keep start-up fast.
-            from d2rpick.vibration.modal_span import find_described
-
-            guess = _get_quiet_window(history, quiet)
-            modes = find_described(history, td, guess)
+            modes = _find_modes(history, td, quiet)
             described = _choose_longer_window(described, modes)
     flight = choose_flight(
         history, td, seen, described, quiet, settings.after, settings.landing
@@ -332,6 +337,27 @@ def examine_td(
     if not models:
         return situation
     return replace(situation, evidence=evidence._replace(models=models))
+
+
+def _find_known_lines(search: SpanSearch, td: float) -> KnownLines | None:
+    """Return the lines of the modes around td, unless an oscillator describes most of the record or none are found."""
+    history = search.history
+    if find_longest_described(history, search.bounds, search.whole) is not None:
+        return None
+    modes = _find_modes(history, td, find_quiet_time(history, td))
+    if modes is None:
+        return None
+    return KnownLines(modes.vibration.reading.spectrum.lines, *modes.span)
+
+
+def _find_modes(
+    history: History, td: float, quiet: QuietTime | None
+) -> ModalWindow | None:
+    """Find the window around td in which modes continue undisturbed; ``quiet`` is the time without loads."""
+    # Imported here to keep start-up fast.
+    from d2rpick.vibration.modal_span import find_described
+
+    return find_described(history, td, _get_quiet_window(history, quiet))
 
 
 def _choose_time_of_fit(seen: Seen, td: float) -> float:

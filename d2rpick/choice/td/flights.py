@@ -256,7 +256,7 @@ def list_momentum_columns(history: History) -> dict[str, Samples]:
     import numpy as np
 
     # Imported here to keep start-up fast.
-    from d2rpick.flight.momentum import find_all_flights
+    from d2rpick.flight.momentum import find_all_flights, find_flight_around
 
     momenta = _find_momenta_of_flights(history)
     if momenta is None:
@@ -265,8 +265,11 @@ def list_momentum_columns(history: History) -> dict[str, Samples]:
     members = momenta.chosen
     if flights and momenta.parts:
         longest = max(flights, key=lambda flight: flight.end - flight.start)
+        # Just after a contact, a loose part may hardly disturb the sum of the others, and seem not to belong to it.
+        middle = (longest.start + longest.end) / 2
+        flight = find_flight_around(momenta, middle, history.balance) or longest
         members = tuple(
-            momenta.parts.index(part) for part in longest.parts or momenta.parts
+            momenta.parts.index(part) for part in flight.parts or momenta.parts
         )
     mass = momenta.mass(members)
     name = "velocity" if momenta.velocity else "momentum"

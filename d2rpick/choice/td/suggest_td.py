@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 
 # The search for the best td tries this many of the most promising energy peaks and as many of the last peaks.
 _MOST_PEAKS: Final = 12
-# For many modes, windows of at least these lengths are compared, relative to the longest window [-].
+# If there are many modes, td is chosen among windows of at least these fractions of the longest window [-].
 _LEAST_RIGID: Final = (0.5, 0.25)
 _FEWEST_TD, _MOST_TD = 3, 1000
 # Number of td values in a uniform grid, which gives a smooth curve on paper and on screen.
@@ -431,15 +431,21 @@ def _select_surest(pairs: Sequence[Choice]) -> list[Choice]:
     """Return the pairs with the most certain tr. Pairs that are too short to be planned are used only if all are."""
     if not pairs:
         return []
-    record = pairs[0][0].history.time
-    shortest = MIN_RIGID * float(record[-1] - record[0])
-    long = [pair for pair in pairs if pair[1].rigid_time >= shortest] or pairs
+    long = _drop_too_short(pairs)
     certainties = [_rate_tr_at(situation) for situation, _ in long]
     return [
         pair
         for pair, pair_certainty in zip(long, certainties, strict=True)
         if pair_certainty == max(certainties)
     ]
+
+
+def _drop_too_short(pairs: Sequence[Choice]) -> Sequence[Choice]:
+    """Return the pairs that are long enough to be planned; all pairs if none is."""
+    if not pairs:
+        return pairs
+    shortest = MIN_RIGID * pairs[0][0].history.duration
+    return [pair for pair in pairs if pair[1].rigid_time >= shortest] or pairs
 
 
 def _rate_tr_at(situation: Situation) -> int:
@@ -469,7 +475,7 @@ def _choose_by_modes(
         times = _list_times_by_modes(situation, (window[0], first, last), share)
         pairs += _select_acceptable(look(td) for td in times)
         least_time = share * (last - first)
-        good = [pair for pair in pairs if _is_good(pair[1])]
+        good = [pair for pair in _drop_too_short(pairs) if _is_good(pair[1])]
         long = [pair for pair in good if pair[1].rigid_time >= least_time]
         if long:
             return _find_best_of_long(long)[0].td, _get_td(_find_longest(pairs))

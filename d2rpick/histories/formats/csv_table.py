@@ -136,7 +136,10 @@ def find_time_column(
     if times:
         return times[0], []
     if not layout.names:
-        return min(numeric, default=0), []
+        first = min(numeric, default=0)
+        return first, [
+            f"the table has no line of headings; column {first + 1} was used as the time"
+        ]
     candidates = sorted(
         column for column in numeric if find_meaning(layout.name(column)) is None
     )

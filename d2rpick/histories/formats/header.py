@@ -154,7 +154,7 @@ def _fit(cells: Sequence[str], columns: int) -> list[str]:
 
 
 def _fill_from_left(cells: Sequence[str]) -> list[str]:
-    """Repeat each name, except a time, in the empty cells after it, as if a spreadsheet had merged these cells."""
+    """Copy each name, except that of a time column, into the empty cells that follow it (merged spreadsheet cells)."""
     filled = [cells[0]]
     for cell in cells[1:]:
         filled.append(cell or (filled[-1] if len(filled) > 1 else ""))
