@@ -4,7 +4,7 @@ from functools import cache
 from pathlib import Path
 
 from d2rpick.models.box_model import Parameters
-from d2rpick.models.box_run import Record, RigidWindow, simulate
+from d2rpick.models.box_run import BoxWindow, Record, simulate
 from d2rpick.report import history_files
 
 MESH = 6  # elements per edge; coarse, for speed
@@ -23,7 +23,7 @@ def drop(
     return simulate(
         parameters,
         T_END,
-        *(RigidWindow(*window) for window in windows),
+        *(BoxWindow(*window) for window in windows),
         interval=interval,
     )
 

@@ -8,9 +8,9 @@ import numpy as np
 from d2rpick.models.box_model import Parameters
 from d2rpick.models.box_run import (
     BOX,
+    BoxWindow,
     Outcome,
     Record,
-    RigidWindow,
     scan,
     scan_times,
     simulate,
@@ -125,7 +125,7 @@ def _mean_ratio(parameters: Parameters, tr: float, td: float, interval: float) -
     flying = replace(parameters, ground=NO_GROUND)
     runs = (
         simulate(flying, td + MEAN_OVER, *windows, interval=interval)
-        for windows in ((RigidWindow(tr, td),), ())
+        for windows in ((BoxWindow(tr, td),), ())
     )
     means = [float(run.internal_energy[run.time > td, BOX].mean()) for run in runs]
     return means[0] / means[1]

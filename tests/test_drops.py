@@ -16,7 +16,7 @@ from d2rpick.choice.question import Settings, read_reference
 from d2rpick.choice.td.plan import plan_run
 from d2rpick.histories.opening import Selection
 from d2rpick.models.box_model import Parameters
-from d2rpick.models.box_run import RigidWindow, simulate
+from d2rpick.models.box_run import BoxWindow, simulate
 from tests.drops import write_run_files
 
 SETS = tuple(
@@ -55,7 +55,7 @@ def compute_outcome(parameters: Parameters, interval: float = INTERVAL) -> DropO
     switched = simulate(
         parameters,
         T_END,
-        *(RigidWindow(*window) for window in windows),
+        *(BoxWindow(*window) for window in windows),
         interval=interval,
     )
     contacts = switched.landings

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from d2rpick.models.box_model import Parameters
-    from d2rpick.models.box_run import Record, RigidWindow
+    from d2rpick.models.box_run import BoxWindow, Record
     from d2rpick.report.rollover import Scan
     from d2rpick.vibration.oscillator import Oscillator, Replay, State, Trajectory
 
@@ -265,16 +265,16 @@ class Box:
         )
 
     @property
-    def windows(self) -> tuple[RigidWindow, ...]:
+    def windows(self) -> tuple[BoxWindow, ...]:
         """The windows in which the box is rigid."""
-        from d2rpick.models.box_run import RigidWindow
+        from d2rpick.models.box_run import BoxWindow
 
         return tuple(
-            RigidWindow(tr, td, self.with_step)
+            BoxWindow(tr, td, self.with_step)
             for tr, td in zip(self.tr, self.td, strict=True)
         )
 
-    def simulated(self, *rigid: RigidWindow) -> Record:
+    def simulated(self, *rigid: BoxWindow) -> Record:
         """Compute the run of the box with these windows."""
         from d2rpick.models.box_run import simulate
 

@@ -229,7 +229,7 @@ def _count_updates(motion: BoxMotion) -> int:
 
 
 @dataclass(frozen=True)
-class RigidWindow:
+class BoxWindow:
     """The interval from ``tr`` to ``td`` [s] in which the box is rigid, alone or joined to the step (``with_step``).
 
     Raises RangeError unless 0 <= tr <= td.
@@ -249,7 +249,7 @@ class RigidWindow:
 def simulate(
     parameters: Parameters,
     t_end: float,
-    *windows: RigidWindow,
+    *windows: BoxWindow,
     interval: float = INTERVAL,
 ) -> Record:
     """Compute a run from 0 to ``t_end`` that stores a state every ``interval`` [s].
@@ -278,7 +278,7 @@ def simulate(
     return continue_motion(motion, t_end, *windows)
 
 
-def continue_motion(motion: BoxMotion, t_end: float, *windows: RigidWindow) -> Record:
+def continue_motion(motion: BoxMotion, t_end: float, *windows: BoxWindow) -> Record:
     """Continue ``motion`` to ``t_end`` [s] and switch at the first time step at or after the times of ``windows``.
 
     Raises RangeError if its numbers become infinite.
@@ -429,14 +429,14 @@ def scan(
 
 def _make_branches(
     motion: BoxMotion, times: Iterable[float], td: float, end: float
-) -> Iterator[tuple[BoxMotion, float, RigidWindow]]:
+) -> Iterator[tuple[BoxMotion, float, BoxWindow]]:
     """Yield, for each tr, a copy of the reference run at that tr, the end time of the switched run, and its window."""
     for tr in times:
         run_to(motion, tr)
-        yield motion.copy(), end, RigidWindow(tr, td)
+        yield motion.copy(), end, BoxWindow(tr, td)
 
 
-def _compute_switched_run(branch: tuple[BoxMotion, float, RigidWindow]) -> Record:
+def _compute_switched_run(branch: tuple[BoxMotion, float, BoxWindow]) -> Record:
     """Compute a switched run that branches off from the reference run at tr."""
     return continue_motion(*branch)
 

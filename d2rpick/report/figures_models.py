@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from d2rpick.choice.answers import PairSuggestion
     from d2rpick.models.box_model import Parameters
-    from d2rpick.models.box_run import Outcome, Record, RigidWindow
+    from d2rpick.models.box_run import BoxWindow, Outcome, Record
     from d2rpick.vibration.oscillator import Replay, Trajectory
 
 
@@ -70,7 +70,7 @@ def draw_rollover(
     parameters: Parameters,
     reference: Record,
     switched: Record | None = None,
-    windows: Sequence[RigidWindow] = (),
+    windows: Sequence[BoxWindow] = (),
 ) -> Figure:
     """Draw outlines of the box at regular times with sled, curb and ground and, below, roll angle and height over time.
 
@@ -158,7 +158,7 @@ def _draw_outlines(
     axes.grid(visible=True, linewidth=0.3)
 
 
-def _draw_times(axes: Axes, reference: Record, windows: Sequence[RigidWindow]) -> None:
+def _draw_times(axes: Axes, reference: Record, windows: Sequence[BoxWindow]) -> None:
     """Shade the rigid windows; mark the end of the push by the sled and the start of the ground contact."""
     for number, window in enumerate(windows):
         label = "_" if number else "rigid"

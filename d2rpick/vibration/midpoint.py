@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     Mask = NDArray[np.bool_]
 
 
-class Comparison(NamedTuple):
+class PairEnergies(NamedTuple):
     """The elastic energies at tr and at td, the product of both deformations, and the coherence of the modes [energy].
 
     Noise may make elastic energies negative.
@@ -151,7 +151,7 @@ class Reading:
         """
         return self.compare(tr, td).overlap
 
-    def compare(self, tr: Samples | float, td: Samples | float) -> Comparison:
+    def compare(self, tr: Samples | float, td: Samples | float) -> PairEnergies:
         """Return what is known of pairs of times, which may be broadcast."""
         middle = (np.asarray(tr) + td) / 2
         level = self.level(middle)
@@ -161,13 +161,13 @@ class Reading:
         at_td = self.elastic_energy(td)
         # The largest possible product of deformations with these elastic energies.
         bound = np.sqrt(np.maximum(at_tr, 0.0) * np.maximum(at_td, 0.0))
-        return Comparison(at_tr, at_td, np.clip(free, -bound, bound), coherence)
+        return PairEnergies(at_tr, at_td, np.clip(free, -bound, bound), coherence)
 
     def residual_squared(self, tr: Samples | float, td: Samples | float) -> Samples:
         """Return the squared residual R^2 of pairs of times [-]."""
         return self.square_residual(self.compare(tr, td), td)
 
-    def square_residual(self, pairs: Comparison, td: Samples | float) -> Samples:
+    def square_residual(self, pairs: PairEnergies, td: Samples | float) -> Samples:
         """Return the squared residual R^2 of pairs of times that were compared [-]."""
         lost = pairs.elastic_energy_tr - 2 * pairs.overlap
         return np.maximum(1 + lost / self.vibration_energy(td), 0.0)

@@ -22,10 +22,10 @@ import numpy as np
 from d2rpick.choice.answers import suggest_in_history
 from d2rpick.choice.question import Settings
 from d2rpick.models.box_model import Parameters
-from d2rpick.models.box_run import RigidWindow, make_history, simulate
+from d2rpick.models.box_run import BoxWindow, make_history, simulate
 from tests.rehearsals import SETS, Rehearsal, rehearse
 
-WINDOW = RigidWindow(0.0970, 0.370)  # what suggest recommends for the default
+WINDOW = BoxWindow(0.0970, 0.370)  # what suggest recommends for the default
 HEAD = (
     " #  stiffness  yield  damping  speed  mesh  released  landed     td       tr  roll error  of worst  "
     "announced   mean     off"

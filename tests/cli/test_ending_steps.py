@@ -10,6 +10,7 @@ import pytest
 import d2rpick as d2
 from tests.command import (
     ENERGY,
+    GLSTAT,
     MATSUM,
     ROLLOVER,
     ROOT,
@@ -162,7 +163,7 @@ def test_parts_without_a_set_at_the_given_td_choose_it_themselves() -> None:
 
 def test_pages_written_by_python_name_the_next_step(tmp_path: Path) -> None:
     table = d2.parts(d2.read(MATSUM), deck=DECK)
-    study = d2.study([ENERGY], td=0.064)
+    study = d2.study([ENERGY, GLSTAT], td=0.064)
     for answer, command in ((table, "plan"), (study, "study --td 0.0687534")):
         written = answer.report(tmp_path / "page.html").read_text("utf-8")
         assert f"d2rpick {command}" in written.rpartition("To repeat this")[0]

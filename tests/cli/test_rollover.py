@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 from d2rpick.choice.answers import suggest_in_history
 from d2rpick.choice.question import Settings
 from d2rpick.models.box_model import Parameters
-from d2rpick.models.box_run import Outcome, RigidWindow, make_history, simulate
+from d2rpick.models.box_run import BoxWindow, Outcome, make_history, simulate
 from d2rpick.report import figures_models
 from d2rpick.report.formats import DisplayOptions, write
 from d2rpick.report.rollover import Scan
@@ -130,7 +130,7 @@ def test_a_box_that_falls_is_switched_in_several_windows(tmp_path: Path) -> None
 
 
 def test_the_figure_of_a_motion_superposes_the_outlines_of_both_runs() -> None:
-    window = RigidWindow(0.05, 0.2)
+    window = BoxWindow(0.05, 0.2)
     reference, switched = (
         simulate(Parameters(mesh=4), 0.25, *rigid, interval=5e-4)
         for rigid in ((), (window,))

@@ -18,8 +18,8 @@ from d2rpick.models.box_model import (
 from d2rpick.models.box_motion import SLIP, BoxMotion, Contact, RigidPoints
 from d2rpick.models.box_run import (
     BOX,
+    BoxWindow,
     Record,
-    RigidWindow,
     compare_box_runs,
     continue_motion,
     find_comparison_end,
@@ -64,7 +64,7 @@ def copy_at(time: float) -> BoxMotion:
 
 
 @cache
-def simulate_box(parameters: Parameters, *windows: RigidWindow) -> Record:
+def simulate_box(parameters: Parameters, *windows: BoxWindow) -> Record:
     """Compute a run through trip or fall, flight and landing."""
     return simulate(
         parameters, 1.2 if parameters.drop else 0.42, *windows, interval=INTERVAL
@@ -75,16 +75,16 @@ def simulate_box(parameters: Parameters, *windows: RigidWindow) -> Record:
     ("parameters", "windows"),
     [
         (COARSE, ()),
-        (COARSE, (RigidWindow(0.1, 0.2), RigidWindow(0.3, 0.35))),
-        (COARSE, (RigidWindow(0.1, 0.2, with_step=True), RigidWindow(0.3, 0.35))),
+        (COARSE, (BoxWindow(0.1, 0.2), BoxWindow(0.3, 0.35))),
+        (COARSE, (BoxWindow(0.1, 0.2, with_step=True), BoxWindow(0.3, 0.35))),
         (
             Parameters(mesh=6, stiffness=2e6, yield_strain=2e-3),
-            (RigidWindow(0.03, 0.2),),
+            (BoxWindow(0.03, 0.2),),
         ),
     ],
 )
 def test_energy_is_balanced_within_one_percent_through_trip_flight_and_landing(
-    parameters: Parameters, windows: tuple[RigidWindow, ...]
+    parameters: Parameters, windows: tuple[BoxWindow, ...]
 ) -> None:
     run = simulate_box(parameters, *windows)
     assert run.landed is not None
@@ -94,10 +94,10 @@ def test_energy_is_balanced_within_one_percent_through_trip_flight_and_landing(
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "windows",
-    [(), (RigidWindow(0.0, 0.28),), (RigidWindow(0.0, 0.28), RigidWindow(0.45, 0.5))],
+    [(), (BoxWindow(0.0, 0.28),), (BoxWindow(0.0, 0.28), BoxWindow(0.45, 0.5))],
 )
 def test_a_box_that_falls_bounces_and_its_energy_is_balanced_however_often_it_is_switched(
-    windows: tuple[RigidWindow, ...],
+    windows: tuple[BoxWindow, ...],
 ) -> None:
     run = simulate_box(FALLING, *windows)
     assert np.abs(run.imbalance).max() < 0.01
@@ -117,7 +117,7 @@ def test_a_box_that_falls_bounces_and_its_energy_is_balanced_however_often_it_is
 def test_a_free_fall_locks_in_nothing_and_moves_no_landing() -> None:
     whole, switched = (
         simulate(FALLING, 0.62, *windows, interval=INTERVAL)
-        for windows in ((), (RigidWindow(0.0, 0.28),))
+        for windows in ((), (BoxWindow(0.0, 0.28),))
     )
     assert whole.internal_energy[whole.time < 0.28].max() < 1e-9
     np.testing.assert_allclose(
@@ -213,7 +213,7 @@ def test_a_rigid_phase_of_no_length_takes_the_vibration_velocity_and_nothing_els
 
 
 def test_a_window_of_no_length_is_a_run_that_goes_on() -> None:
-    run = simulate(COARSE, 0.2, RigidWindow(0.1, 0.1), interval=INTERVAL)
+    run = simulate(COARSE, 0.2, BoxWindow(0.1, 0.1), interval=INTERVAL)
     assert run.lost_energy[-1] > 0
     assert run.internal_energy[run.time > 0.1, BOX].std() > 0
 
@@ -221,7 +221,7 @@ def test_a_window_of_no_length_is_a_run_that_goes_on() -> None:
 def test_while_it_is_rigid_the_box_keeps_its_energy_and_computes_no_bars() -> None:
     whole, switched = (
         simulate_box(COARSE),
-        simulate_box(COARSE, RigidWindow(0.14, 0.42)),
+        simulate_box(COARSE, BoxWindow(0.14, 0.42)),
     )
     rigid = switched.time > 0.14
     assert np.ptp(switched.internal_energy[rigid, BOX]) < 1e-9
@@ -236,7 +236,7 @@ def test_while_it_is_rigid_the_box_keeps_its_energy_and_computes_no_bars() -> No
 def test_a_step_that_is_switched_with_the_box_moves_with_it_and_is_released_with_it() -> (
     None
 ):
-    window = RigidWindow(0.14, 0.3, with_step=True)
+    window = BoxWindow(0.14, 0.3, with_step=True)
     whole, switched = simulate_box(COARSE), simulate_box(COARSE, window)
     rigid = (switched.time > window.tr) & (switched.time < window.td)
     after = (switched.time > window.td) & (switched.time < 0.35)
@@ -403,7 +403,7 @@ def test_contact_sleeps_in_the_flight_and_misses_nothing() -> None:
 def test_the_mean_energy_of_a_scan_and_its_errors_are_those_of_single_runs() -> None:
     reference, times, td = simulate_box(COARSE), [0.02, 0.15], 0.36
     alone = [
-        compare_box_runs(reference, simulate_box(COARSE, RigidWindow(tr, td)), tr, td)
+        compare_box_runs(reference, simulate_box(COARSE, BoxWindow(tr, td)), tr, td)
         for tr in times
     ]
     assert list(scan(COARSE, reference, times[::-1], td, jobs=1)) == alone
@@ -441,11 +441,9 @@ def test_what_is_no_model_or_no_window_is_refused() -> None:
             Parameters(**values)
     for refused, why in (
         (lambda: simulate(Parameters(stiffness=1e12), 100), "softer bars"),
-        (lambda: RigidWindow(0.2, 0.1), "must be in this order"),
+        (lambda: BoxWindow(0.2, 0.1), "must be in this order"),
         (
-            lambda: simulate(
-                COARSE, 0.3, RigidWindow(0.1, 0.2), RigidWindow(0.15, 0.25)
-            ),
+            lambda: simulate(COARSE, 0.3, BoxWindow(0.1, 0.2), BoxWindow(0.15, 0.25)),
             "begins before the one up to",
         ),
         (

@@ -13,7 +13,7 @@ from d2rpick.choice.question import Settings
 from d2rpick.choice.runs.study import choose_common_tr, make_row
 from d2rpick.models.box_run import (
     BOX,
-    RigidWindow,
+    BoxWindow,
     compare_box_runs,
     make_history,
     simulate,
@@ -67,14 +67,14 @@ class Trial(NamedTuple):
     ``stiffness``: one tr for the base and the stiffness +-15 % alone [s], and the largest level error of the three.
     """
 
-    window: RigidWindow
+    window: BoxWindow
     kept: bool
     runs: tuple[Tried, ...]
     stiffness: tuple[float, float] | None
 
 
 @lru_cache(maxsize=64)
-def _run(parameters: Parameters, *windows: RigidWindow) -> Record:
+def _run(parameters: Parameters, *windows: BoxWindow) -> Record:
     return simulate(parameters, _END, *windows)
 
 
@@ -86,7 +86,7 @@ def _make_setting_exhibit(_: Parameters) -> Exhibit:
 
 
 def _make_early_exhibit(base: Parameters) -> Exhibit:
-    reference, early = _run(base), _run(base, RigidWindow(_EARLY, TD))
+    reference, early = _run(base), _run(base, BoxWindow(_EARLY, TD))
     roll_error = _compute_roll_error(reference, early)
     return _make_comparison(
         "early", "Switched at 1 ms", "2a, b", 1, base, (_EARLY,),
@@ -101,7 +101,7 @@ def _make_early_exhibit(base: Parameters) -> Exhibit:
 def _make_energy_exhibit(base: Parameters) -> Exhibit:
     reference = _run(base)
     errors = {
-        tr: _compute_roll_error(reference, _run(base, RigidWindow(tr, TD)))
+        tr: _compute_roll_error(reference, _run(base, BoxWindow(tr, TD)))
         for tr in (_LITTLE, _MUCH)
     }
     energy = {
@@ -124,7 +124,7 @@ def _make_revised_exhibit(base: Parameters) -> Exhibit:
     tr = _find_own_tr(reference, TD)
     assert tr is not None
     errors = [
-        _compute_roll_error(reference, _run(base, RigidWindow(time, TD)))
+        _compute_roll_error(reference, _run(base, BoxWindow(time, TD)))
         for time in (_REVISED, tr)
     ]
     return _make_comparison(
@@ -150,7 +150,7 @@ def _make_comparison(
     shapes = [Shape("without switching", _make_outlines(reference))]
     rolls, differences, heights = [Curve("without switching", "roll_deg")], [], []
     for tr in times:
-        run, key = _run(base, RigidWindow(tr, TD)), f"{1e3 * tr:.4g}"
+        run, key = _run(base, BoxWindow(tr, TD)), f"{1e3 * tr:.4g}"
         label = f"tr = {key} ms"
         columns[f"roll_{key}_deg"] = np.degrees(run.roll)
         columns[f"droll_{key}_deg"] = np.degrees(run.roll - reference.roll)
@@ -247,7 +247,7 @@ def try_variants(variants: Sequence[Variant]) -> Trial:
     ]
     common = choose_common_tr(rows)
     assert common.tr is not None
-    window = RigidWindow(common.tr, td)
+    window = BoxWindow(common.tr, td)
     common_results = zip(variants, rows, common.errors, strict=True)
     runs = tuple(
         _switch_variant(trial_result, row, error or 0.0, window)
@@ -268,7 +268,7 @@ def try_variants(variants: Sequence[Variant]) -> Trial:
 
 
 def _switch_variant(
-    variant: Variant, row: StudyRow, error: float, common: RigidWindow
+    variant: Variant, row: StudyRow, error: float, common: BoxWindow
 ) -> Tried:
     reference, run = _run(variant.parameters), _run(variant.parameters, common)
     outcome = compare_box_runs(reference, run, common.tr, common.td)
@@ -305,7 +305,7 @@ def make_variants_exhibit(trial: Trial) -> Exhibit:
     )  # fmt: skip
 
 
-def _make_variant_panels(window: RigidWindow) -> tuple[tuple[Panel, ...], ...]:
+def _make_variant_panels(window: BoxWindow) -> tuple[tuple[Panel, ...], ...]:
     dots, common = {"style": "dots", "x": "run"}, 1e3 * window.tr
     level = (f"common tr = {common:.1f} ms, td = {1e3 * window.td:g} ms", common)
     rigid = (
