@@ -74,8 +74,8 @@ ENOUGH_STATES: Final = 200
 _FEW_STATES: Final = 20
 # Largest number of parts that are named in a sentence.
 _NAMED: Final = 5
-# Number of neighbouring states that noise around zero does not make negative by chance.
-_NEIGHBOURS: Final = 3
+# Number of standard deviations of the noise by which an energy of zero may seem negative; 4 cover 16,000 states.
+_NOISE_DEVIATIONS: Final = 4.0
 _WRONG_BY_MORE: Final = "the vibration after td is wrong by more than"
 MORE_OFTEN: Final = "write the energies more often"
 NAME_PARTS: Final = "name the parts to be switched with `parts`"
@@ -657,17 +657,14 @@ def _list_causes_of_record(
 
 @remember
 def _is_energy_negative(history: History, start: float | None, td: float) -> bool:
-    """Return True if the energy is clearly negative in several neighbouring states of the flight up to td.
-
-    Noise around zero is negative in single states.
-    """
+    """Return True if the energy in the flight up to td becomes negative by more than the noise of the record explains."""
     _, energy = history.between(-np.inf if start is None else start, td)
-    if energy.size < _NEIGHBOURS:
+    if not energy.size:
         return False
-    highest_of_neighbours = np.lib.stride_tricks.sliding_window_view(
-        energy, _NEIGHBOURS
-    ).max(axis=1)
-    return bool(highest_of_neighbours.min() < MIN_PLASTIC * np.abs(energy).max())
+    # The second differences of white noise have 6 times its variance; those of a vibration only add to them.
+    variance = np.mean(np.diff(energy, 2) ** 2) / 6 if energy.size > 2 else 0.0
+    lowest_of_zero = MIN_PLASTIC * np.abs(energy).max()
+    return bool(energy.min() < lowest_of_zero - _NOISE_DEVIATIONS * np.sqrt(variance))
 
 
 def rate_certainty_of_tr(best: Candidate) -> int:
