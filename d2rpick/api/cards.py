@@ -1,4 +1,4 @@
-"""Define the options of a card, and complete them with what the run and its deck say."""
+"""Define the options of a card, and fill in missing ones from the run and its deck."""
 
 from __future__ import annotations
 

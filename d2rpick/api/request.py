@@ -38,7 +38,7 @@ MIN_MEAN_ENERGY: Final = grades.MIN_MEAN_ENERGY
 MIN_QUALITY: Final = choice_options.MIN_QUALITY
 # Options for reading a history.
 READING: Final = ("input_format", "time", "energy", "part", "flying", "channel")
-# The same without ``part``, because a deck that is checked defines the switched parts itself.
+# The same arguments as above except ``part``, because a deck that is checked defines the switched parts itself.
 _READING_FOR_CARDS: Final = tuple(name for name in READING if name != "part")
 OSCILLATOR: Final = ("stiffness", "mass", "frame_mass", "beta", "alpha", "v0")
 _MODEL: Final = (*OSCILLATOR, "no_verify")

@@ -43,7 +43,7 @@ _TICK: Final = 50_000_000  # Resolution of the file times on most file systems [
 _COARSE: Final = 2_000_000_000
 # Longest time that is needed to write a byte [ns]; a system may set the file time when the last write begins.
 _SLOWEST: Final = 5
-# Pause before a file is read again that may still be being written [s].
+# Pause before rereading a file that another process may still be writing [s].
 _PAUSE: Final = 0.05
 _CHECKSUM: Final = ', "checksum": "'
 

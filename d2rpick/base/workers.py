@@ -36,7 +36,7 @@ _WAITING = 2
 _LEAST_ON_CLUSTER = 64
 # Largest number of attempts to start a pool; the fork server is restarted after the first attempt.
 _STARTS = 3
-_DYING = 0.1  # Pause between attempts to start a pool [s], in which the system finishes ending a killed process.
+_DYING = 0.1  # Pause between attempts to start a pool [s], so that the system can finish terminating a killed process.
 # Errors that are raised if a process is started after the fork server was killed.
 _NOT_STARTED = (BrokenProcessPool, EOFError, OSError)
 # Filter, as in PYTHONWARNINGS, for warnings whose text begins with the name of the resource tracker.

@@ -258,7 +258,7 @@ def verify_at(situation: Situation, tr: float) -> PairVerdict:
 
 
 def _list_remarks(judged: Candidates, candidate: Candidate) -> tuple[str, ...]:
-    """Return the notes on a candidate that are not objections, or that repeat how large its error is."""
+    """Return the notes on a candidate that raise no objection or only restate the size of its error."""
     objections = list_separate_objections(judged, candidate)
     return tuple(note for note in candidate.notes if note not in objections)
 

@@ -180,7 +180,7 @@ class Output:
         self.result(name_options_and_wrap(text, self.output_format, now.width))
 
     def beside_answer(self, answer: Paged, page: Callable[[], str]) -> None:
-        """Write the figure and the page if the user requests them; their computation is shown on a terminal."""
+        """Write the figure and the page if the user requests them; on a terminal, show the progress."""
         with show_computing(quiet=self.quiet):
             if self.plot:
                 from d2rpick.report import figures

@@ -60,7 +60,7 @@ def reals(names: str, width: int = WIDTH) -> list[CardColumn]:
 
 
 def words(names: str, width: int = WIDTH) -> list[CardColumn]:
-    """Declare columns of words with these names."""
+    """Declare text columns with these names."""
     return _declare(names, str, width)
 
 

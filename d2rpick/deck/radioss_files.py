@@ -87,7 +87,7 @@ def list_run_files(path: str) -> list[str]:
 
 
 def find_root(path: str) -> str:
-    """Return the beginning that a run's file names share, such as ``NAME`` for ``NAME_0001.rad``; otherwise empty.
+    """Return the common prefix of a run's file names, such as ``NAME`` for ``NAME_0001.rad``; empty if there is none.
 
     The engine looks for the restart file whose name has the same beginning as its own file, regardless of the name in
     /RUN. Source: runs computed with OpenRadioss.

@@ -147,7 +147,7 @@ def _search_once(
     *,
     search: Callable[[float], FreeFlight | None],
 ) -> FreeFlight | None:
-    """Return the flight that a source of evidence in a history shows around a time."""
+    """Return the flight around a time according to one source of evidence in a history."""
     return search(moment)
 
 

@@ -54,7 +54,7 @@ _DAMPED, _LEFT = 0.2, 0.05
 # A loss of at most this fraction of the momentum between successive states is attributed to damping [-].
 _SHOWN = 0.1
 # Largest deviation of the momentum in a window without loads, relative to its largest value and to its range [-].
-# A fading load that causes this deviation may change the momentum by twice as much over the window.
+# A fading load that causes this deviation may change the momentum by twice this fraction over the window.
 # If only some of the moving parts are tested, TOLERANCE replaces this limit, because other parts act on them.
 _ENOUGH = 3e-3
 # The next three constants are used to find gravity perpendicular to a load of constant direction.
@@ -240,7 +240,7 @@ class Laws:
             return
         force, _ = np.polyfit(time - time[0], momentum, 1)
         force_across = across @ force
-        # The rows of the projector are the parts of the axes perpendicular to the load.
+        # Each row of the projection matrix is the component of one coordinate axis perpendicular to the load.
         for axis, axis_across in zip(np.eye(along.size), across, strict=True):
             square = axis_across @ axis_across
             if square <= _SEEN**2:

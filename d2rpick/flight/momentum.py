@@ -67,7 +67,7 @@ def select_momenta_for_flight(momenta: Sequence[Momenta]) -> Sequence[Momenta]:
 def find_flight_around(
     momenta: Momenta, td: float, balance: Balance | None = None
 ) -> FreeFlight | None:
-    """Find the set of parts that flies freely around ``td`` for clearly the longest time, and the window of its flight.
+    """Find the set of parts whose free flight around ``td`` is by far the longest, and the window of that flight.
 
     Unless the set is given, three sets are tried: the chosen parts, the chosen parts with the parts attached to them,
     and all parts.

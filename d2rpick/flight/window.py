@@ -186,7 +186,7 @@ def _find_converged_window(
     *,
     rings: bool,
 ) -> tuple[tuple[int, int], float, bool] | None:
-    """Find the window around the state ``at`` that hardly shrinks at a tenth of the tolerance; None if there is none.
+    """Find the window around state ``at`` that hardly shrinks at a tenth of the tolerance, if there is one.
 
     The tolerance ``limit`` is reduced down to ``finest``; once it is at most ``enough``, a window may shrink at one
     end. The other returned values are the largest misfit of the window, and True if the first window began with the
@@ -265,7 +265,7 @@ def list_moments(time: Samples) -> Iterator[float]:
 
 
 def list_marks(time: Samples, td: float) -> Iterator[float]:
-    """Yield the start times of the search for the flight around ``td``, which many td share.
+    """Yield the times at which the search for the flight around ``td`` starts; many values of td share them.
 
     The first is the nearest of the widely spaced times, because a long flight around it may contain td. The two times
     nearest to td follow.

@@ -252,7 +252,7 @@ class OnDisk(Content):
         )
 
     def check(self) -> None:
-        """Raise ChangedError unless all bytes that were read belong to one state of the file."""
+        """Raise ChangedError unless all bytes were read from the same version of the file."""
         now = FileState.of(self._file)
         if now.is_as(self._state):
             return

@@ -264,7 +264,7 @@ def find_quantities(names: Sequence[str]) -> dict[str, list[str]]:
 
 
 def _find_subject(names: Sequence[str]) -> tuple[str, ...]:
-    """Return the words in the only name of an internal energy that name its part or model.
+    """If exactly one name is that of an internal energy, return the words in it that identify the part or model.
 
     The result is empty if several names, or none, denote an internal energy.
     """

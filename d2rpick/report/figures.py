@@ -149,7 +149,7 @@ def show_span(
     scale: Scale,
     above: Sequence[tuple[str, float]],
 ) -> None:
-    """Show a curve at the times in ``span``, and mark where the top of the scale cuts its values off.
+    """Plot a curve over ``span``, and mark where its values are clipped at the top of the scale.
 
     Parameters
     ----------

@@ -172,7 +172,7 @@ def _differentiate_heights(lines: Exponentials, times: Samples) -> Samples:
 
 
 def _move_lines(grid: Grid, lines: Exponentials, step: Samples) -> Spectrum:
-    """Return the spectrum of the lines after a ``step`` (4 k,) of their parameters.
+    """Return the spectrum of the lines after their parameters are changed by ``step`` (4 k,).
 
     The growth and the decay of the lines are limited to those of modes, because a longer step could overflow.
     """

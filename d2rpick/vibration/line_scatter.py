@@ -76,7 +76,7 @@ class LineScatter:
         return np.concatenate([sizes, sizes, decays, rates, of_mean])
 
     def _compute_gradient(self, tr: Samples, td: Samples, squared: Samples) -> Samples:
-        """Return the derivatives of the ``squared`` residual by all parameters, shape (n, p) [1/energy, time/1].
+        """Differentiate the ``squared`` residual with respect to all parameters, shape (n, p) [1/energy, time/1].
 
         R^2 = 1 + [V(tr) - 2 V(m) + H(m) - C(tr, td)] / H(td), which neglects the small change of U within a period.
         """

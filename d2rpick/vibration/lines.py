@@ -228,7 +228,7 @@ def _differentiate(waves: Complex, weights: Complex, since_origin: Samples) -> S
 
 
 class Spectrum(NamedTuple):
-    """An energy as ``lines`` and a ``mean`` that are fitted to a grid; ``rest`` (m,) is the misfit [energy]."""
+    """An energy modelled by ``lines`` and a ``mean``; ``rest`` (m,) is the misfit on the grid [energy]."""
 
     lines: Exponentials
     mean: Exponentials

@@ -415,7 +415,7 @@ class ModalVibration:
 
     @cached_property
     def _wrong(self) -> float:
-        """Return the error that widens the error bands of all pairs equally [-]."""
+        """Return the part of the error of the squared residual that is common to all pairs [-]."""
         doubts = self.doubts
         if self.reading.no_static:
             # An error of the mean energy is not added, because the band covers the interpretation with static energy.
@@ -709,7 +709,7 @@ def _choose_interpretation(
     mean = max(float(np.mean(half)), 1e-300)
     share = float(np.mean(static)) / mean
 
-    # The lines of static deformations, taken as modes, may explain all of the mean energy; then no energy is static.
+    # If lines of static deformations are treated as modes, these may explain the whole mean energy.
     half_of_all = plain.level_of_modes(time) / 2
     excess = abs(float(np.mean(spectrum.mean.at(time) - half_of_all)))
     explains_mean = excess < _AMBIGUOUS * float(np.mean(half_of_all))

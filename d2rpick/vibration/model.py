@@ -203,7 +203,7 @@ class Vibration:
         )
 
     def measured(self, times: Samples) -> Columns:
-        """Return the measures of each time as tr, if its deformation can be compared with that at td."""
+        """Measure each time as a candidate for tr, provided that its deformation can be compared with that at td."""
         return measure_all([self], times, [0, times.size])[1]
 
     def errors(self, times: Samples) -> Samples:

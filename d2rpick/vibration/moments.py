@@ -98,7 +98,7 @@ class SampledEnergy:
         return near[near >= since]
 
     def _sampled_before(self, since: float) -> tuple[Samples, Samples]:
-        """Return times and energies from the last sample before ``since`` to td, which has the energy of the level."""
+        """Return times and energies from the last sample before ``since`` up to td, which has the level."""
         first, last = np.searchsorted(self.history.time, (since, self.td))
         states_before = slice(max(int(first) - 1, 0), int(last))
         time = self.history.time[states_before]
@@ -115,7 +115,7 @@ class SampledEnergy:
 
 
 class OscillatorEnergy(SampledEnergy):
-    """A ``mode``, the ``fit`` by which it describes a record in the window ``span``, and a ``td`` in this window."""
+    """A ``mode``, its ``fit`` to a record in the window ``span``, and a ``td`` in this window."""
 
     mode: Mode
 

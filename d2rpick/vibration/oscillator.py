@@ -253,7 +253,7 @@ class Oscillator:
 def _compute_path(alpha: float, t: Values) -> Values:
     """Return s(t) = (1 - exp(-alpha t))/alpha, the path of a damped body of unit speed; t if alpha is 0."""
     damping = alpha * t
-    # For tiny products, the quotient loses its digits, whereas two terms of the series are exact.
+    # For tiny products, the quotient loses precision, whereas two terms of the series are exact to rounding.
     return np.where(
         np.abs(damping) < 1e-8,
         t * (1 - damping / 2),

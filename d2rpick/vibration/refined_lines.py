@@ -90,7 +90,7 @@ def refine_prediction(grid: Grid, prediction: Prediction) -> Prediction:
 
 
 def _refine_in_first_part(grid: Grid, spectrum: Spectrum) -> Spectrum:
-    """Return the lines of the record as the first part of the record alone shows them."""
+    """Return the spectral lines of the record, estimated from its first part alone."""
     poles = spectrum.lines.poles, spectrum.mean.poles
     return _refine_spectrum(grid.first_part, fit_weights(grid.first_part, *poles))
 
@@ -148,7 +148,7 @@ def _sum_sizes(spectrum: Spectrum) -> float:
 def _list_missing_poles(
     spectrum: Spectrum, of_first_part: Spectrum, grid: Grid
 ) -> list[complex]:
-    """Return the poles of the first part's lines that the record's lines do not contain, strongest lines first."""
+    """Return the poles of lines found in the first part of the record but not in all of it, strongest first."""
     lines = of_first_part.lines
     rates = lines.poles.imag
     apart = np.abs(np.subtract.outer(rates, spectrum.lines.poles.imag))

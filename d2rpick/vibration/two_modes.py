@@ -27,7 +27,7 @@ _SHARES: Final = (1.0, 0.5, 0.25)
 
 
 class KnownLines(NamedTuple):
-    """The spectral ``lines`` of a record from ``first`` to ``last`` [time]; these times tell which lines they are."""
+    """The spectral ``lines`` of a record from ``first`` to ``last`` [time]."""
 
     lines: Exponentials
     first: float

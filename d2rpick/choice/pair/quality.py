@@ -657,7 +657,7 @@ def _list_causes_of_record(
 
 @remember
 def _is_energy_negative(history: History, start: float | None, td: float) -> bool:
-    """Return True if the energy in the flight up to td becomes negative by more than the noise of the record explains."""
+    """Return True if the energy in the flight up to td becomes negative by more than noise explains."""
     _, energy = history.between(-np.inf if start is None else start, td)
     if not energy.size:
         return False

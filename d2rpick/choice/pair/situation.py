@@ -62,7 +62,7 @@ _FAINT: Final = 1e-4
 # If an oscillator describes at least this fraction of the record, no modes are fitted [-].
 _MOST_OF_RECORD: Final = 0.5
 # Rounding error of a printed energy, in units of the last printed digit [-].
-# Two units are assumed, because a constant energy may alternate between two printed values.
+# The rounding error is two units of the last printed digit, because a constant energy may alternate between two values.
 _QUANTA: Final = 2
 
 

@@ -118,7 +118,7 @@ def find_alike_windows(
 def count_coverage(
     runs: Sequence[Samples],
 ) -> tuple[Samples, np.ndarray[tuple[int], np.dtype[np.intp]]]:
-    """Count, for each time, the runs that have a window with this time.
+    """For each time, count the runs that have a window containing it.
 
     Parameters
     ----------

@@ -124,7 +124,7 @@ class Binout(Database):
         return np.stack(components, axis=2)
 
     def find_resume_points(self) -> dict[str, ResumePoint]:
-        """Return where a later read of each file can begin: at the second-to-last state that both branches contain."""
+        """Return the offset from which each file can be read further: the second-to-last state of both branches."""
         return {file.source: file.find_resume_point(_BRANCHES) for file in self._files}
 
     def branch(self, name: str) -> Branch:

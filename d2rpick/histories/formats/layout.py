@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 # Text at the start of the LS-DYNA listings d3hsp and messag.
 _LISTING_OF_LS_DYNA: Final = "Livermore Software"
 # Pairs of a separator (None: spaces) and a decimal sign, in the order in which they are tried.
-# If separator and decimal sign are both commas, a row is readable only if its numbers are in quotes.
+# If the separator and the decimal sign are both commas, a row is readable only if its numbers are quoted.
 _FORMS = (
     *((sign, decimal) for sign in (";", "\t", "|") for decimal in ".,"),
     *((",", "."), (",", ","), (None, "."), (None, ",")),
@@ -146,7 +146,7 @@ def _add_header(table: Layout, header: Header) -> Layout:
 
 
 def add_thousands(table: Layout, columns: Sequence[Sequence[str]]) -> Layout:
-    """Add the thousands separator without which some cells of the columns would not be numbers."""
+    """Add to the layout the thousands separator that is needed to read some cells of the columns as numbers."""
     odd = [
         cell
         for cells in columns
