@@ -125,15 +125,15 @@ def test_without_a_flight_every_command_leads_to_the_missing_output(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("command", ["suggest", "explore", "plan", "parts"])
-def test_when_all_pairs_of_a_run_are_compared_no_command_follows(
+def test_when_no_pair_of_a_run_can_be_used_only_the_deck_of_a_switched_run_follows(
     command: str, tmp_path: Path
 ) -> None:
     deck = str(put(tmp_path / "CAR_0000.rad", read_starter("CAR")))
     question = ("--part", "1-14", "--deck", deck, locate_stored("carT01.gz"))
     step = list_first_lines(command, *question)["next"]
-    assert step.startswith("no ")
-    assert "can be used" in step
-    assert "d2rpick" not in step
+    assert step.startswith("no pair of this run can be used")
+    assert step.count("d2rpick") == 1
+    assert "d2rpick plan --min-quality poor --write-deck switched" in step
 
 
 def test_a_set_of_parts_that_cannot_be_used_is_an_objection() -> None:
