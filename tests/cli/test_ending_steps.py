@@ -131,9 +131,13 @@ def test_when_no_pair_of_a_run_can_be_used_only_the_deck_of_a_switched_run_follo
     deck = str(put(tmp_path / "CAR_0000.rad", read_starter("CAR")))
     question = ("--part", "1-14", "--deck", deck, locate_stored("carT01.gz"))
     step = list_first_lines(command, *question)["next"]
-    assert step.startswith("no pair of this run can be used")
-    assert step.count("d2rpick") == 1
-    assert "d2rpick plan --min-quality poor --write-deck switched" in step
+    assert step.startswith("no ")
+    assert "can be used" in step
+    if command == "parts":
+        assert "d2rpick" not in step
+    else:
+        assert step.count("d2rpick") == 1
+        assert "d2rpick plan --min-quality poor --write-deck switched" in step
 
 
 def test_a_set_of_parts_that_cannot_be_used_is_an_objection() -> None:
