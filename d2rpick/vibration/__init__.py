@@ -99,7 +99,7 @@ def _find_modal(
     from d2rpick.vibration.span import Span
 
     internal = identify_window(history, Span(first, last))
-    if internal is not None and (internal.is_vague or not internal.signed):
+    if internal is not None and internal.signed and internal.is_vague:
         # The load may end within the first output interval of the flight, and its rest is then read as many modes.
         times, _ = history.between(first, last)
         without_first_state = identify_window(history, Span(float(times[1]), last))
