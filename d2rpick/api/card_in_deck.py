@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from d2rpick.deck.printed_card import PrintedCard
 
 OBJECTION: Final = "card-objection"
+ERROR_OF_CARD: Final = "card-error"
 UNJOINED: Final = "parts-not-joined"
 
 
@@ -35,19 +36,22 @@ def collect_objections(
 
     from d2rpick.deck.writing import write_deck
     from d2rpick.rules import check_deck
-    from d2rpick.rules.base import INFO
+    from d2rpick.rules.base import ERROR, INFO
 
     with TemporaryDirectory() as folder:
         try:
             checked = check_deck(write_deck(question.deck, card, folder)[0])
         except DeckError as error:
-            yield Caution(OBJECTION, f"the card does not fit into the deck: {error}")
+            yield Caution(
+                ERROR_OF_CARD, f"the card does not fit into the deck: {error}"
+            )
             return
         for finding in checked.findings:
             if finding.severity is not INFO:
                 location = finding.file.removeprefix(f"{folder}/")
                 message = f"{finding.rule} ({finding.severity}): {finding.message.replace(f'{folder}/', '')}"
+                is_error = finding.severity is ERROR
                 yield Caution(
-                    OBJECTION,
+                    ERROR_OF_CARD if is_error else OBJECTION,
                     f"check of the deck with this card, {location}:{finding.line}: {message}",
                 )

@@ -6,6 +6,7 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final, Unpack
 
+from d2rpick.api.card_in_deck import ERROR_OF_CARD
 from d2rpick.api.cards import Cards, name_needed_argument, parse_id_ranges
 from d2rpick.api.request import CHOOSING_FOR_CARDS, Request
 from d2rpick.base.errors import ArgumentError, Caution
@@ -61,9 +62,14 @@ class JudgedCard(NamedTuple):
         )
 
     @property
+    def has_errors(self) -> bool:
+        """True if the check of the deck with the card finds an error, so that the card must not be used."""
+        return any(caution.code == ERROR_OF_CARD for caution in self.cautions)
+
+    @property
     def passed(self) -> bool:
-        """Return True if all windows are admissible and have at least the grade ``min_quality``."""
-        return all(
+        """True if all windows are admissible and reach the grade ``min_quality``, and the card has no errors."""
+        return not self.has_errors and all(
             verdict.decision.reaches(verdict.situation.settings.min_quality)
             for verdict in self.verdicts
         )

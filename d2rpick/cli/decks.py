@@ -84,6 +84,7 @@ def card(
     if judged_card.worst:
         settings = judged_card.verdicts[0].situation.settings
         output.finish_by_verdict(judged_card.worst, settings.min_quality)
+    output.finish(objection=judged_card.has_errors)
 
 
 def _read_windows(

@@ -177,6 +177,7 @@ def suggest(
     output.beside_answer(
         answer, lambda: answer.page(options.repeat_command(), request.judging(), cards)
     )
+    judged_card = None
     if card:
         # Imported here to keep start-up fast.
         from d2rpick.api.judged_cards import collect_cautions
@@ -206,6 +207,7 @@ def suggest(
     # The best pair for a given td is shown even if it is poor; the answer and the card then say so.
     min_quality = request.min_quality or ("poor" if td is not None else "fair")
     _finish_answer(output, question, decision, min_quality)
+    output.finish(objection=bool(judged_card and judged_card.has_errors))
 
 
 def _finish_answer(

@@ -292,6 +292,7 @@ class Output:
                     caution.code == "parts-not-joined"
                     for caution in judged_card.cautions
                 ),
+                has_errors=judged_card.has_errors,
             )
         )
         return judged_card.passed

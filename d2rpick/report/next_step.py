@@ -412,13 +412,17 @@ def name_step_after_card(
     deck: str | None,
     *,
     is_separate: bool,
+    has_errors: bool,
 ) -> str:
     """Return the next step after a card: check the ``deck`` or, if the ``worst`` pair is unusable, choose other times.
 
     ``is_separate``: each part becomes a rigid body of its own, although they may share nodes.
+    ``has_errors``: the check of the deck with the card finds errors, so that they have to be corrected first.
     """
     if worst is not None and worst.verdict == DO_NOT_USE:
         return f"choose other times with {write_command(question, 'suggest')}"
+    if has_errors:
+        return "correct the options of the card or the deck as the errors above say, and print the card again"
     if card.has_engine_files:
         action = "save the lines below each '# ---- NAME' as the file NAME next to the starter deck"
         name = "starter deck"

@@ -239,9 +239,14 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "An initial velocity does not include the main node of a rigid body, so the body starts at rest.",
             "Correct the initial velocity as rule D2R407 explains.",
         ),
+        "card-error": Explanation(
+            "A check of the deck together with this card finds an error. The solver may stop, or switch the wrong "
+            "parts. The exit code is 1.",
+            "Read the rule that the warning names (d2rpick rule ID), correct the options of the card or the deck, and "
+            "print the card again.",
+        ),
         "card-objection": Explanation(
-            "A check of the deck together with this card finds a problem. The solver may stop, or switch the wrong "
-            "parts.",
+            "A check of the deck together with this card finds a problem that is less severe than an error.",
             "Read the rule that the warning names (d2rpick rule ID), and correct the card or the deck.",
         ),
         "cost-unknown": Explanation(

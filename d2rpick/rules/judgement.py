@@ -19,7 +19,7 @@ from d2rpick.choice.pair.warnings import (
     describe_end_of_flight,
     describe_end_of_load,
 )
-from d2rpick.choice.parts.deck_of_run import add_surroundings
+from d2rpick.choice.parts.deck_of_run import add_surroundings, describe_other_model
 from d2rpick.choice.question import Reference, Settings
 from d2rpick.deck import read_inventory
 from d2rpick.flight.contact_times import (
@@ -60,6 +60,10 @@ _KEPT: Final = (
 _UNKNOWN: Final = (
     "the history does not show when the load ends; give that time with `after`"
 )
+_NOT_BY_DECK: Final = (
+    "the history shows a flight, but not under the gravity and supports of this deck; check that the history is of "
+    "this deck, or give the end of the load with `after`"
+)
 
 
 class Fault(NamedTuple):
@@ -98,11 +102,22 @@ class HistoryJudge:
     _cautions: dict[Caution, list[int]] = field(default_factory=dict)
 
     def use_deck(self, deck: str) -> None:
-        """Use the supports, gravity and joints of a deck for the next judgements; without parts, none are known."""
+        """Use the supports, gravity and joints of a deck for the next judgements; without parts, none are known.
+
+        Raises
+        ------
+        DeckError
+            If the history belongs to another model than the deck, so that it judges no time of the deck.
+        """
         try:
             inventory = read_inventory(deck)
         except DeckError:
             inventory = None
+        difference = describe_other_model(self.run, inventory) if inventory else ""
+        if difference:
+            raise DeckError(
+                f"{deck}: the history is of another model: {difference}; give the history of this deck"
+            )
         run = add_surroundings(self.run.within(UNKNOWN), inventory)
         if run.surroundings is not self.run.surroundings:
             self.run = run
@@ -153,7 +168,8 @@ class HistoryJudge:
         ``together`` contains the parts that are switched at the same times. A window that a force switches
         (``by_force``) is judged between states of the history.
         """
-        if window.closed is None and window.opened.by.kind == "plain":
+        is_from_start = window.tr == 0 and window.opened.by.kind == "plain"
+        if is_from_start and window.closed is None:
             # A part that is rigid from the start to the end of the run has no time that a history could judge.
             return Judgement()
         td = window.td if window.td is not None and window.td > window.tr else None
@@ -235,6 +251,15 @@ class HistoryJudge:
             return ()
         return tuple(part.id for part in self.run.parts)
 
+    def _explain_unknown_load(self, parts: tuple[int, ...]) -> str:
+        """Explain why the end of the load is unknown: by the history, or only by its contradiction to the deck."""
+        without_deck = HistoryJudge(
+            self.run.within(UNKNOWN), self.selection, self.settings
+        )
+        history = without_deck._reference(parts).history
+        situation = examine_td(history, history.end, self.settings)
+        return _UNKNOWN if situation.earliest_tr is None else _NOT_BY_DECK
+
     def _judge_times(
         self, parts: tuple[int, ...], tr: float, td: float | None
     ) -> Judgement:
@@ -245,7 +270,10 @@ class HistoryJudge:
         if outside:
             return Judgement(outside)
         if td is None:
-            return Judgement(tuple(_judge_open_window(history, tr, self.settings)))
+            faults = tuple(_judge_open_window(history, tr, self.settings))
+            if any(fault.message == _UNKNOWN for fault in faults):
+                faults = (Fault("D2R204", False, self._explain_unknown_load(parts)),)
+            return Judgement(faults)
         if (tr, td) in self.done:
             return Judgement()
         verdict = verify_run(reference, tr, td, self.settings)

@@ -98,6 +98,15 @@ def _make_wheel_run(
     return make_run(files, write_starter_deck(more=wheel + body))
 
 
+def _make_sprung_run(title: str, part: int) -> Example:
+    """Return the run with a wheel and the history of a mass on a spring; ``title`` is that of the wheel's ``part``."""
+    example = _make_wheel_run(part=part)
+    deck = example.deck.replace("/PART/1\nbox\n", "/PART/1\nframe\n").replace(
+        f"/PART/{part}\nwheel\n", f"/PART/{part}\n{title}\n"
+    )
+    return example._replace(deck=deck, history=_SPRING)
+
+
 def _find_switching_legs(case: RunCase) -> list[RadiossLeg]:
     """Return the engine runs if any of them switches a body; otherwise an empty sequence."""
     return case.run.legs if any(leg.switched for leg in case.run.legs) else []
@@ -427,9 +436,9 @@ def _check_left_rigid(case: RunCase) -> Iterator[PlacedMessage]:
 
 
 @set_passing(
-    lambda: [GOOD_RUN, _make_wheel_run(), _make_wheel_run()._replace(history=_SPRING)]
+    lambda: [GOOD_RUN, _make_wheel_run(), _make_sprung_run("suspended mass", part=2)]
 )
-@set_failing(lambda: [_make_wheel_run(part=3)._replace(history=_SPRING)])
+@set_failing(lambda: [_make_sprung_run("spring", part=3)])
 @make_rule_decorator(
     "D2R409",
     ERROR,

@@ -469,8 +469,9 @@ def _check_entity_named(case: Case) -> Iterator[PlacedMessage]:
 
 def _make_landing_deck(wait: str) -> Example:
     """Return a deck with a pair of sets, and the history of the landing box; ``wait`` is TIME3."""
-    # The deck has the ENDTIM of the history.
+    # The deck has the ENDTIM and the part titles of the history.
     landed = _make_delayed_deck(wait).deck.replace("       0.2", "       0.7", 1)
+    landed = landed.replace("\ndoor\n", "\nbox\n").replace("\nframe\n", "\nstep\n")
     return Example(landed, history=_LANDING, computed_by="rollover")
 
 

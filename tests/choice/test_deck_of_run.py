@@ -158,7 +158,8 @@ def test_a_card_keeps_off_what_the_run_of_the_deck_keeps_off(tmp_path: Path) -> 
     )
     for args in (("suggest", *TD), ("plan",)):
         printed = run(*args, *card_options)
-        assert printed.exit_code == 0, printed.stderr
+        # The deck has no bodies with the main nodes 1809 and 1810 (D2R402).
+        assert printed.exit_code == 1, printed.stderr
         assert printed.stdout.count("/RBODY/OFF\n1808 1809 1810\n") == 2
         assert printed.stdout.count("/RBODY/ON\n1808\n/RBODY/OFF\n1809 1810\n") == 1
 
@@ -241,8 +242,10 @@ def test_a_body_that_no_leg_switches_is_judged_by_the_energy_of_its_parts(
     tmp_path: Path, part: int, found: list[str]
 ) -> None:
     example = RULES["D2R408"].failing[0]
-    text = example.deck.replace("/PART/2", f"/PART/{part}").replace(
-        "/SHELL/2", f"/SHELL/{part}"
+    text = (
+        example.deck.replace("/PART/1\nbox\n", "/PART/1\nframe\n")
+        .replace("/PART/2", f"/PART/{part}")
+        .replace("/SHELL/2", f"/SHELL/{part}")
     )
     deck = write(tmp_path, text, example.files, example.name)
     history = str(tmp_path / "matsum")
@@ -308,6 +311,15 @@ def test_what_needs_the_deck_is_refused(foreign: str, tmp_path: Path) -> None:
     ):
         assert "the deck is not used" in read_refusal(*command)
     assert not (tmp_path / "next").exists()
+
+
+def test_check_judges_no_time_by_the_history_of_another_model(foreign: str) -> None:
+    refusal = read_refusal("check", foreign, "--history", MATSUM)
+    by_plan = list_warnings("plan", "--part", "all", "--deck", foreign, MATSUM)
+    difference = by_plan["deck-of-another-model"].partition(": the deck is not used")[0]
+    assert f"the history is of another model: {difference}; give the history" in refusal
+    both = run_json("check", foreign, str(DECK), "--history", MATSUM)
+    assert [Path(deck).name for deck in both["decks"]] == [DECK.name]
 
 
 def test_the_library_leaves_it_out_too(foreign: str) -> None:

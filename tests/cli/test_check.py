@@ -16,7 +16,17 @@ import d2rpick as d2
 from d2rpick.rules import RULES
 from d2rpick.rules.example import END, HEAD, PARTS, write_automatic_card
 from d2rpick.rules.rule import GOOD, THERE
-from tests.command import BOX, DECK, ENERGY, GLSTAT, MATSUM, read_refusal, run, run_json
+from tests.command import (
+    BOX,
+    DECK,
+    ENERGY,
+    GLSTAT,
+    MATSUM,
+    ROOT,
+    read_refusal,
+    run,
+    run_json,
+)
 from tests.json_schemas import (
     check_by_schema,
     check_junit,
@@ -279,6 +289,38 @@ def test_a_radioss_run_is_judged_by_a_history_and_found_in_a_folder() -> None:
     assert check_report["decks"] == ["runs/box_0000.rad"]
     assert set(list_rules(check_report)) <= {"D2R201", "D2R202", "D2R203"}
     assert {"D2R201", "D2R202"} & set(list_rules(check_report))
+
+
+@pytest.mark.parametrize(
+    ("after", "objection"),
+    [(None, ""), ("0.01", ""), ("0.03", "tr = 0.02 lies before the end of the load")],
+)
+def test_a_radioss_body_that_stays_rigid_is_judged_by_its_tr(
+    after: str | None, objection: str
+) -> None:
+    starter, *_, last = place_run()
+    Path(last).unlink()  # the engine file that makes the body deformable again
+    options = ("--after", after) if after else ()
+    report = run_json("check", starter, "--history", ENERGY, *options)
+    messages = [f["message"] for f in report["findings"] if f["rule"] == "D2R204"]
+    assert objection in " ".join(messages)
+    assert bool(messages) == bool(objection)
+
+
+def test_a_flight_that_the_deck_contradicts_is_not_passed_in_silence() -> None:
+    samples = ROOT / "sample_data"
+    deck = str(
+        samples / "flying_box" / "BOX_0000.rad"
+    )  # without the gravity of the run
+    asked = ("check", deck, "--history", str(samples / "rollover_boxT01"))
+    expected = {
+        (): "a flight, but not under the gravity and supports of this deck",
+        ("--after", "0.087"): "tr = 0.02 lies before the end of the load",
+    }
+    for options, objection in expected.items():
+        findings = run_json(*asked, *options)["findings"]
+        (message,) = (f["message"] for f in findings if f["rule"] == "D2R204")
+        assert objection in message
 
 
 def test_printed_engine_files_pass() -> None:

@@ -154,6 +154,35 @@ def test_what_check_would_say_is_said_when_the_card_is_printed(tmp_path: Path) -
     )  # the message must not name the temporary folder
 
 
+@pytest.mark.parametrize("command", ["card", "suggest", "plan"])
+def test_a_card_with_an_error_is_no_success_and_is_not_recommended(
+    command: str, box: Path
+) -> None:
+    times = {
+        "card": ("--tr", "0.123689", "--td", "0.37", "--history"),
+        "suggest": ("--td", "0.37", "-f", "card"),
+        "plan": ("-f", "card"),
+    }
+    asked = (command, "--part", "1,2", "--deck", str(box / "main.k"), "--merge")
+    expected = {"1": 0, "7": 1}
+    for lead, exit_code in expected.items():
+        result = run(*asked, lead, *times[command], MATSUM)
+        assert result.exit_code == exit_code
+        assert ("card-error" in result.stderr) == bool(exit_code)
+    assert "lead part 7 not in the deck" in result.stderr
+    assert "next: add these cards" not in result.stderr
+    assert run(*asked, "7", "--exit-zero", *times[command], MATSUM).exit_code == 0
+
+
+def test_the_step_after_a_card_with_an_error_is_to_correct_it(box: Path) -> None:
+    deck, times = ("--deck", str(box / "main.k")), ("--tr", "0.123689", "--td", "0.37")
+    asked = ("card", "--min-quality", "poor", "--history", MATSUM, *deck, *times)
+    steps = {"1": "add these cards", "7": "correct the options of the card or the deck"}
+    for lead, step in steps.items():
+        result = run(*asked, "--part", "1,2", "--merge", lead)
+        assert f"next: {step}" in result.stderr
+
+
 def test_ids_of_the_deck_are_not_used_again(tmp_path: Path) -> None:
     first, second = (
         f"{901:10d}{0:10d}{0.01:10g}",

@@ -65,7 +65,14 @@ def merge_into_one_body(
 
 
 def check_model_of_deck(run: OpenedRun, inventory: Inventory) -> Caution | None:
-    """Return a warning if a deck does not match the model of a run, otherwise None.
+    """Return a warning if a deck does not match the model of a run, otherwise None."""
+    difference = describe_other_model(run, inventory)
+    text = f"{difference}: the deck is not used; give the deck of this run"
+    return Caution("deck-of-another-model", text) if difference else None
+
+
+def describe_other_model(run: OpenedRun, inventory: Inventory) -> str:
+    """Describe how the model of a deck differs from that of a run; empty if the deck belongs to the run.
 
     A deck does not belong to a run if most titles of their common parts differ, or if the deck was read completely and
     lacks parts that have energy.
@@ -91,8 +98,7 @@ def check_model_of_deck(run: OpenedRun, inventory: Inventory) -> Caution | None:
     absent = [part for part in run.parts if part.id not in ids_in_deck]
     if not difference and inventory.complete and _has_energy(run, absent):
         difference = f"{name_units(part.id for part in absent)} of the history {choose_verb(absent)} not in the deck"
-    text = f"{difference}: the deck is not used; give the deck of this run"
-    return Caution("deck-of-another-model", text) if difference else None
+    return difference
 
 
 def _has_energy(run: OpenedRun, parts: Sequence[Part]) -> bool:
