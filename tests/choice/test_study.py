@@ -584,8 +584,8 @@ def test_the_error_at_the_common_tr_of_a_run_is_its_residual() -> None:
     ("windows", "cause"),
     [
         (
-            {"a": ((1, 2), (4, 5)), "b": ((2.5, 3),)},
-            "tr is admissible in 1 interval of b from 2.5 to 3 and in 2 intervals of a from 1 to 5: they do not overlap",
+            {"a": ((1, 2), (5, 6)), "b": ((3, 4),)},
+            "tr is admissible in 1 interval of b from 3 to 4 and in 2 intervals of a from 1 to 6: they do not overlap",
         ),
         (
             {"a": ((1, 3),), "b": ((2, 5),), "c": ((1, 1.5), (4, 5))},
