@@ -186,6 +186,15 @@ def test_a_landing_before_every_flight_is_refused(command: str) -> None:
     assert "give the time of the contact that ends a flight" in result.stderr
 
 
+def test_info_leads_to_the_later_restart_segments_that_were_not_named() -> None:
+    legs = [locate_stored(f"rollover_r100_T0{number}.gz") for number in (1, 2, 3)]
+    question = ("info", "--part", "box")
+    step = find_line("next", *question, legs[0])
+    line = shlex.join(("d2rpick", *question, *legs))
+    assert step == f"read the later restart segments too with {line}"
+    assert "info" not in find_line("next", *question, *legs)
+
+
 def test_without_part_energies_no_part_is_called_unable_to_be_switched() -> None:
     text = find_line("make rigid", "parts", "--deck", DECK, ENERGY)
     assert text == "unknown: this history does not contain single parts"
