@@ -15,7 +15,7 @@ import click
 
 from d2rpick.base import __version__
 from d2rpick.base.caching import cached_property
-from d2rpick.base.errors import format_in_one_line
+from d2rpick.base.errors import format_in_one_line, list_names
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -213,6 +213,9 @@ def _format_usage_error(error: click.UsageError) -> str:
         return f"{problem}. The times are those of the deck; d2rpick verify judges other times"
     if error.option_name == "--tr":
         return f"{problem}. d2rpick verify judges a given tr with its td"
+    commands = _list_commands_with_option(error)
+    if commands:
+        return f"{problem}. It is an option of {list_names(commands, most=3)}"
     import difflib
 
     likeness = {
@@ -223,6 +226,23 @@ def _format_usage_error(error: click.UsageError) -> str:
     nearest = [name for name in likeness if likeness[name] >= best - _LESS_ALIKE]
     names = " or ".join(map(repr, sorted(nearest, key=lambda name: -likeness[name])))
     return f"{problem}. Did you mean {names}?"
+
+
+def _list_commands_with_option(error: click.NoSuchOption) -> list[str]:
+    """Return the names of the other commands that have an unknown option."""
+    context = error.ctx.parent if error.ctx else None
+    if context is None or not isinstance(context.command, click.Group):
+        return []
+    named = (
+        (name, context.command.get_command(context, name))
+        for name in context.command.list_commands(context)
+    )
+    return [
+        f"d2rpick {name}"
+        for name, command in named
+        if command
+        and any(error.option_name in option.opts for option in command.params)
+    ]
 
 
 def _ask_for_value(error: click.BadOptionUsage) -> str:

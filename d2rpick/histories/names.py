@@ -395,6 +395,10 @@ def _match_piece(
         raise FormatError(
             f"{problem} {list_parts(inside) or 'none'}; choose by a number or title that is one part's only"
         )
+    if high < low:
+        raise FormatError(
+            f"{where}: the range {piece} runs backwards; write {high}-{low}"
+        )
     if not inside:
         raise FormatError(
             f"{where}: no part {piece} (expected part ids, not set ids); there are: {list_parts(parts)}"

@@ -99,6 +99,14 @@ def _find_modal(
     from d2rpick.vibration.span import Span
 
     internal = identify_window(history, Span(first, last))
+    if internal is not None and internal.signed and internal.is_vague:
+        # The load may end within the first output interval of the flight, and its rest is then read as many modes.
+        times, _ = history.between(first, last)
+        without_first_state = identify_window(history, Span(float(times[1]), last))
+        if without_first_state is not None and (
+            without_first_state.signed and not without_first_state.is_vague
+        ):
+            internal = without_first_state
     kinetic = together.kinetic
     return confirm_by_kinetic_energy(
         internal, identify_modal(*kinetic, kinetic=True) if kinetic else None

@@ -44,7 +44,7 @@ UNSEEN = (
 # Records that are searched for modes: a random walk has none, and noisy modes are found in several windows.
 SEARCHED = (
     ("random walk", 10_000, 3.5),
-    ("random walk", 100_000, 5.0),
+    ("random walk", 100_000, 5.5),
     ("noisy", 10_000, 7.5),
 )
 STARTS = (

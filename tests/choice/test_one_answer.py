@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import d2rpick as d2
 from d2rpick.choice.answers import (
     PairVerdict,
     suggest_in_history,
@@ -26,7 +27,7 @@ from d2rpick.histories.opening import Selection
 from d2rpick.report.suggestion import describe_acceptable_windows
 from d2rpick.rules.judgement import find_faults
 from tests.choice.test_same_answers import make_record
-from tests.command import BOX, run
+from tests.command import BOX, MATSUM, ROOT, run
 from tests.computed import locate_stored
 from tests.drops import drop, write_run_files
 from tests.energies import (
@@ -316,3 +317,16 @@ def test_a_crossing_at_the_start_of_the_flight_may_be_typed_as_it_is_read() -> N
     assert not verify_in_history(
         history, start - 1e-5, float(time[60] + np.pi / 10), settings
     ).admissible
+
+
+@pytest.mark.parametrize("after", [None, 0.086, 0.087])
+def test_a_state_at_the_end_of_the_load_does_not_turn_the_answer(
+    after: float | None,
+) -> None:
+    """The momenta begin the flight a state before the energies; with this state, R was stated as 0 to 1.55."""
+    box = d2.read([MATSUM, str(ROOT / "sample_data" / "rollover_box.glstat")])
+    verdict = d2.verify(box, tr=0.123689, td=0.37, after=after).to_dict()
+    alone = d2.verify(d2.read(MATSUM), tr=0.123689, td=0.37, parts="flying").to_dict()
+    assert verdict["residual"] == pytest.approx(alone["residual"], abs=0.01)
+    assert verdict["residual_high"] < 0.75
+    assert verdict["quality"] == alone["quality"]

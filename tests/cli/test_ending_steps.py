@@ -136,7 +136,7 @@ def test_when_no_pair_of_a_run_can_be_used_only_the_deck_of_a_switched_run_follo
     if command == "parts":
         assert "d2rpick" not in step
     else:
-        assert step.count("d2rpick") == 1
+        assert step.count("d2rpick ") == 1
         assert "d2rpick plan --min-quality poor --write-deck switched" in step
 
 

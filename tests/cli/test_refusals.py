@@ -27,6 +27,8 @@ sugest --td 1 x | No such command 'sugest' | Did you mean 'suggest'? | d2rpick -
 dance | No such command 'dance' | plan, suggest
 # click words this in its own way in each version; the near names stand in all
 suggest --tdd 1 x | --tdd | Did you mean '--td'? | d2rpick suggest --help
+suggest --min-rigid 1 x | --min-rigid | It is an option of d2rpick plan | d2rpick suggest --help
+suggest --td 1 --part 2-1 {MATSUM} | {MATSUM} | the range 2-1 runs backwards; write 1-2$
 verify --tolerence 1 x | --tolerence | --tolerance
 suggest --td 1 --td-window 1 2 x | --td | --td-window
 verify --td 1 x | --tr

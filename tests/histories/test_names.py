@@ -45,7 +45,7 @@ def test_parts_come_in_the_order_of_the_file_and_once(
             r"run: no part 5 \(expected part ids, not set ids\); there are: 12 'Roof', 3 'seat, left', 7, 19 'door'",
         ),
         (["13-18"], "no part 13-18"),
-        (["19-10"], "no part 19-10"),
+        (["19-10"], "19-10 runs backwards; write 10-19"),
         (["rof"], r"no part 'rof' \(did you mean 'Roof'\?\)"),
         (
             ["door"],
