@@ -675,12 +675,7 @@ def _is_admissible_as_printed(situation: Situation, tr: float, td: float) -> boo
 
 def _explain_why_none(situation: Situation, ranked: Candidates) -> str:
     """Return the reason why no candidate is acceptable."""
-    earliest_tr = situation.earliest_tr
-    if (
-        situation.margin
-        and earliest_tr is not None
-        and earliest_tr >= situation.latest_td
-    ):
+    if situation.keeps_nothing_of_flight:
         flight = situation.flight
         return (
             f"the margin {situation.margin:.6g} after the load and before the contact leaves nothing of the flight, "

@@ -59,7 +59,7 @@ def replay(motion: Motion, output: Output) -> None:
     """
     from d2rpick.report.history_files import OSCILLATOR_WRITERS, choose_history_format
 
-    form = motion.write_as or choose_history_format(output.output_file, HISTORIES)
+    form = choose_history_format(output.output_file, HISTORIES, motion.write_as)
     output = output.beside()
     trajectory, switched = motion.computed()
     if output.plot:
@@ -111,7 +111,7 @@ def _run(box: Box, output: Output) -> None:
     """Compute one run and, for a plot, the reference run."""
     from d2rpick.report.history_files import BOX_WRITERS, choose_history_format
 
-    form = box.write_as or choose_history_format(output.output_file, HISTORIES)
+    form = choose_history_format(output.output_file, HISTORIES, box.write_as)
     output = output.beside()
     windows = box.windows
     plot = output.plot

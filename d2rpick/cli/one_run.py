@@ -107,7 +107,7 @@ def extract(write_as: str | None, request: Request, output: Output) -> None:
     from d2rpick.report.history_files import TABLES, choose_history_format, write_table
     from d2rpick.report.next_step import name_step_after_extract
 
-    form = write_as or choose_history_format(output.output_file, TABLES)
+    form = choose_history_format(output.output_file, TABLES, write_as)
     selection = request.selection()
     with open_with_output(request, output) as (run, output):
         table, notes = extract_columns(run.files, selection)

@@ -447,6 +447,19 @@ class History:
             f"{', '.join(self.source)}: {described} {verb} outside the record, {first} to {last}{hint}"
         )
 
+    def check_length(self, length: float, *, argument: str) -> None:
+        """Raise RangeError if an ``argument`` of the user is longer than the record [time]."""
+        if length <= self.duration:
+            return
+        from d2rpick.histories.digits import ask_for_smaller_unit
+
+        hint = ask_for_smaller_unit(self.time, (length,), argument)
+        value, duration = format_distinctly((length, self.duration))
+        raise RangeError(
+            f"{', '.join(self.source)}: `{argument}` {value} is longer than the record, {duration}"
+            f"{hint or '; give a shorter time'}"
+        )
+
     def check_unit(self, *times: float, argument: str) -> None:
         """Raise RangeError if the times of an ``argument`` seem to be in a different unit from those of the record."""
         # A time above 1/1000 of the end of the record has the right unit, so no further check is needed.

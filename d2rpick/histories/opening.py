@@ -18,8 +18,7 @@ from d2rpick.histories.names import Selection
 from d2rpick.histories.run import OpenedRun
 from d2rpick.histories.source import (
     Source,
-    find_later_legs,
-    has_next_leg,
+    find_unread_legs,
     list_tables_of_folder,
     open_files,
 )
@@ -123,10 +122,7 @@ def _note_unused_tables(names: Sequence[str]) -> tuple[str, ...]:
 
 def _note_unread_legs(files: Sequence[str]) -> tuple[str, ...]:
     """Return a note on the later restart segments of a Radioss run that lie next to its files but were not read."""
-    continued = [file for file in files if has_next_leg(file)]
-    if not continued:
-        return ()
-    unread = [leg for leg in find_later_legs(continued) if leg not in files]
+    unread = find_unread_legs(files)
     if not unread:
         return ()
     listed = list_names(unread, most=_MOST_TABLES)

@@ -389,6 +389,17 @@ def has_next_leg(name: str) -> bool:
     return any(os.path.isfile(f"{successor}{suffix}") for suffix in ("", ".gz"))  # noqa: PTH113  pathlib would slow down start-up
 
 
+def find_unread_legs(files: Sequence[str]) -> list[str]:
+    """Return the later restart segments of a Radioss run that lie next to its ``files`` but are not among them."""
+    continued = [file for file in files if has_next_leg(file)]
+    if not continued:
+        return []
+    from pathlib import Path  # Imported here to keep start-up fast.
+
+    given = {str(Path(file)) for file in files}
+    return [leg for leg in find_later_legs(continued) if leg not in given]
+
+
 def find_later_legs(names: Sequence[str]) -> list[str]:
     """Return the later restart segments next to these files that the user did not name."""
     from pathlib import Path  # Imported here to keep start-up fast.

@@ -21,12 +21,22 @@ Table = dict[str, "Samples"]
 TABLES: Final = ("csv", "hdf5")  # Formats whose columns can have arbitrary names.
 _SUFFIXES: Final = {"csv": "csv", "h5": "hdf5", "hdf5": "hdf5", "hdf": "hdf5"}
 
+# Suffixes of workbooks. A table with such a name could not be opened in the program that its name promises.
+_WORKBOOKS: Final = (".xlsx", ".xlsm", ".xls", ".ods")
 
-def choose_history_format(name: str | None, formats: Sequence[str]) -> str:
-    """Return the format for a file name, or csv if there is no name; raise FormatError if the suffix implies no format.
+
+def choose_history_format(
+    name: str | None, formats: Sequence[str], asked: str | None = None
+) -> str:
+    """Return the ``asked`` format or, by default, that of a file name; csv if there is no name.
 
     The suffix determines the format.  A name that has no known suffix must be or contain the name of a solver's
     database.
+
+    Raises
+    ------
+    FormatError
+        If the suffix implies no format and none is asked for, or if it is that of a workbook, which is never written.
 
     Examples
     --------
@@ -37,8 +47,15 @@ def choose_history_format(name: str | None, formats: Sequence[str]) -> str:
     from pathlib import PurePath  # Imported here to keep start-up fast.
 
     if name is None:
-        return "csv"
+        return asked or "csv"
     path = PurePath(name.lower())
+    if path.suffix in _WORKBOOKS:
+        table = make_printable(str(PurePath(name).with_suffix(".csv")))
+        raise FormatError(
+            f"{make_printable(name)}: workbooks ({path.suffix}) are not written; write {table}, which Excel reads"
+        )
+    if asked is not None:
+        return asked
     by_name = next((form for form in ("glstat", "matsum") if form in path.name), None)
     form = _SUFFIXES.get(path.suffix[1:], by_name)
     if form not in formats:

@@ -386,6 +386,8 @@ def name_step_after_refusal(
 
     If the ``decision`` shows that every pair of the record is unusable, the next step is to improve the record.
     """
+    if situation.keeps_nothing_of_flight and "--margin" in question.options:
+        return name_step_to_derived_margin(question)
     if decision is not None and decision.better_parts:
         line = write_command(question, "plan", new_parts=decision.better_parts)
         return f"make other parts rigid; judge them with {line}"
@@ -403,6 +405,13 @@ def name_step_after_refusal(
         line = write_command(question, "suggest", new_parts=[*map(str, ids)])
         return f"judge the parts that vibrate together with {line}"
     return otherwise
+
+
+def name_step_to_derived_margin(question: RepeatedQuestion) -> str:
+    """Return the step after a given margin that leaves nothing of a flight: a plan with the margin of the run."""
+    options = _leave_out(question.options, "--margin")
+    line = write_command(question._replace(options=options), "plan")
+    return f"let d2rpick derive the margin from the run with {line}"
 
 
 def name_step_after_card(

@@ -9,6 +9,7 @@ from d2rpick.base.errors import COPY_AGAIN, list_names, make_printable
 from d2rpick.choice.pair.grades import DO_NOT_USE, USE, USE_WITH_CARE
 from d2rpick.flight import SOURCES
 from d2rpick.flight.flight import NEVER_FLIES
+from d2rpick.histories.source import find_unread_legs
 from d2rpick.report import keys, tables
 from d2rpick.report.fields import Document, Field, get_kind, many, maybe, one_of, row
 from d2rpick.report.formats import RepeatedQuestion
@@ -163,6 +164,12 @@ def list_overview_lines(overview: Overview) -> list[tuple[str, str]]:
     lines += [("flight", _format_flight(*flight)) for flight in overview.flights]
     if overview.energies:
         return [*lines, ("next", _name_step_to_energy(overview))]
+    unread = find_unread_legs(overview.source)
+    if unread:
+        which = [*_list_given_selection(overview)]
+        files = tables.make_positional((*overview.source, *unread))
+        line = tables.quote_shell_line(("d2rpick", "info", *which, *files))
+        return [*lines, ("next", f"read the later restart segments too with {line}")]
     if overview.verdict == DO_NOT_USE:
         is_known = overview.unjudged or overview.rigid
         if overview.rigid and not overview.unjudged:
@@ -209,8 +216,8 @@ def _ask_for_states(overview: Overview) -> str:
     )
 
 
-def _list_selection_options(overview: Overview) -> Iterator[str]:
-    """Yield the options that select the same columns and parts; by default, the flying parts, otherwise all parts."""
+def _list_given_selection(overview: Overview) -> Iterator[str]:
+    """Yield the options with which the user selected columns and parts."""
     selection = overview.selection
     if selection.time is not None:
         yield from ("--time", selection.time)
@@ -222,6 +229,12 @@ def _list_selection_options(overview: Overview) -> Iterator[str]:
         yield from ("--part", name)
     for name in selection.flying:
         yield from ("--flying", name)
+
+
+def _list_selection_options(overview: Overview) -> Iterator[str]:
+    """Yield the options that select the same columns and parts; by default, the flying parts, otherwise all parts."""
+    yield from _list_given_selection(overview)
+    selection = overview.selection
     if selection.energy or selection.parts or not overview.parts:
         return
     flying = any(flight.parts for _, flight in overview.flights)

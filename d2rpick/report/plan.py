@@ -32,6 +32,7 @@ from d2rpick.report.next_step import (
     name_step_after_switched_run,
     name_step_to_card,
     name_step_to_deck,
+    name_step_to_derived_margin,
     name_step_without_flight,
     name_way_out_of_run,
     needs_deck,
@@ -356,6 +357,13 @@ def list_decisive_reasons(plan: RunPlan) -> list[tuple[str, str]]:
             numbers_by_reason.setdefault(reason, []).append(flight.number)
     if not decided and not plan.done and plan.flights:
         reasons = {row.reason: row.number for row in plan.flights if row.reason}
+        if all(row.is_within_given_margin for row in plan.flights):
+            longest = max(row.end - row.start for row in plan.flights)
+            margin = plan.flights[0].margin.time
+            cause = f"the margin {margin:.6g} is longer than every flight"
+            return [
+                ("why", f"{cause}; the longest lasts {longest:.6g} (`margin`)"),
+            ]
         if all(reason.startswith(TOO_SHORT) for reason in reasons):
             shortest = f"the shortest window allowed is {plan.min_rigid:.3g}"
             return [("why", f"every flight is too short; {shortest} (`min_rigid`)")]
@@ -454,7 +462,7 @@ def _list_step_without_window(
             return []
         if not plan.flights:
             return [("next", name_step_without_flight(plan.history, question))]
-        return [("next", _name_step_if_flights_are_short(question))]
+        return [("next", _name_step_if_flights_are_short(plan, question))]
     answer = max(rows, key=lambda row: row.end - row.start).answer
     assert answer is not None
     better = answer.decision.better if answer.decision else None
@@ -465,8 +473,14 @@ def _list_step_without_window(
     return [("next", step)]
 
 
-def _name_step_if_flights_are_short(question: RepeatedQuestion) -> str:
-    """Return the step if no flight leaves the shortest rigid time: a shorter one or, if it was given, no switching."""
+def _name_step_if_flights_are_short(plan: RunPlan, question: RepeatedQuestion) -> str:
+    """Return the step if no flight leaves the shortest rigid time: a shorter one or, if it was given, no switching.
+
+    If a given margin leaves nothing of any flight, the step is to derive the margin.
+    """
+    is_margin_too_long = all(row.is_within_given_margin for row in plan.flights)
+    if is_margin_too_long and "--margin" in question.options:
+        return name_step_to_derived_margin(question)
     if "--min-rigid" in question.times:
         no_pair = name_lack_of_pairs(question)
         return f"{no_pair}: every flight is too short to switch parts in it"

@@ -384,7 +384,8 @@ def list_next_step(
 ) -> list[tuple[str, str]]:
     """Return the next command: to one td for all runs, to the verdict on the common pair, or to the worst run.
 
-    If every run has a usable pair but no tr is common to all of them, each run can have its own tr.
+    If every run has a usable pair but no tr is common to all of them, each run can have its own tr and td. The td of
+    one run is not offered to the others, because their pairs there were not judged and may be unusable.
     """
     judged = [row for row in answer.runs if row.verdict and row.td is not None]
     if not judged:
@@ -404,9 +405,13 @@ def list_next_step(
     elif len(judged) == 1:
         line = write_command(of_worst, "suggest", *question.times)
         step = f"look at the run that was judged with {line}"
-    elif answer.common.tr is None and answer.td is not None:
+    elif answer.common.tr is None:
         line = write_command(of_worst, "suggest", *question.times)
-        step = f"give each run its own tr, which its cards contain; for the first, see {line}"
+        own_times = "tr" if answer.td is not None else "tr and td"
+        contained = "which its cards contain"
+        step = (
+            f"give each run its own {own_times}, {contained}; for the first, see {line}"
+        )
     elif answer.td is None:
         earliest = min(row.td for row in judged if row.td is not None)
         readable = tuple(row.source for row in answer.runs if row.judged)

@@ -317,7 +317,8 @@ def test_where_there_is_none_it_says_which_tr_suits_most_runs_and_which_it_does_
     assert (common_tr.tr, common_tr.window) == (None, None)
     assert (
         common_tr.reason
-        == "no tr is admissible in all of 5 runs; tr = 1.6 is in 3, not in d, e"
+        == "no tr is admissible in all of 5 runs; tr = 1.6 is in 3, not in d, e: "
+        "no tr at all is admissible in e"
     )
     assert (
         compare_rows(10.0, [make_study_row("e")]).common.reason
@@ -579,6 +580,27 @@ def test_the_error_at_the_common_tr_of_a_run_is_its_residual() -> None:
     assert f"residual {residual:.3f}" in heading
 
 
+@pytest.mark.parametrize(
+    ("windows", "cause"),
+    [
+        (
+            {"a": ((1, 2), (5, 6)), "b": ((3, 4),)},
+            "tr is admissible in 1 interval of b from 3 to 4 and in 2 intervals of a from 1 to 6: they do not overlap",
+        ),
+        (
+            {"a": ((1, 3),), "b": ((2, 5),), "c": ((1, 1.5), (4, 5))},
+            "the intervals of b overlap those of each other run, but at different times",
+        ),
+    ],
+)
+def test_a_study_without_a_common_tr_says_why(
+    windows: dict[str, tuple[tuple[float, float], ...]], cause: str
+) -> None:
+    rows = [make_study_row(name, *spans) for name, spans in windows.items()]
+    reason = require(compare_rows(10.0, rows).common.reason)
+    assert reason.endswith(f": {cause}")
+
+
 def test_runs_that_need_their_own_tr_are_not_called_the_worst() -> None:
     good: dict[str, Any] = {
         "quality": "good",
@@ -591,8 +613,10 @@ def test_runs_that_need_their_own_tr_are_not_called_the_worst() -> None:
     question = RepeatedQuestion(files=("a.csv", "b.csv"))
     own_td = compare_rows((5.0, 12.0), rows)
     assert own_td.common.tr is None
+    # At a td of another run, the pairs of this run may be worse, and nothing shows that a common tr exists there.
     ((_, step),) = list_next_step(own_td, question)
-    assert "d2rpick study --td 10 a.csv b.csv" in step
+    assert "its own tr and td" in step
+    assert "d2rpick study" not in step
     ((_, step),) = list_next_step(compare_rows(10.0, rows), question)
     assert "its own tr" in step
     assert "worst" not in step

@@ -92,10 +92,10 @@ def test_a_file_that_cannot_be_used_is_named_with_what_is_wrong(
 @pytest.mark.parametrize(
     ("line", "code"),
     [
-        ("suggest --td 0.064 --margin 1e308", 1),
-        ("suggest --td-window 0.06 0.07 --margin 1e308", 1),
-        ("explore --td-window 0.06 0.07 --steps 2 --margin 1e308", 1),
-        ("plan --margin 1e308", 1),
+        ("suggest --td 0.064 --margin 1e308", 2),
+        ("suggest --td-window 0.06 0.07 --margin 1e308", 2),
+        ("explore --td-window 0.06 0.07 --steps 2 --margin 1e308", 2),
+        ("plan --margin 1e308", 2),
         ("suggest --td 0.064 --margin 1e-308", 0),
         ("suggest --td 0.064 --margin -0.0", 0),
         ("suggest --td 0.064 --max-residual 1e308", 0),

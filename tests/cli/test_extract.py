@@ -354,6 +354,17 @@ def test_a_name_that_tells_no_format_is_refused_before_anything_is_read(
     assert not (tmp_path / name).exists()
 
 
+@pytest.mark.parametrize("asked", [(), ("--write-as", "csv")])
+def test_a_workbook_is_refused_with_the_name_of_a_table(
+    asked: tuple[str, ...], tmp_path: Path
+) -> None:
+    file = tmp_path / "box.xlsx"
+    message = read_refusal("extract", *asked, ENERGY, "-o", str(file))
+    assert "workbooks (.xlsx) are not written" in message
+    assert f"write {file.with_suffix('.csv')}, which Excel reads" in message
+    assert not file.exists()
+
+
 def test_an_existing_file_and_an_input_are_kept(tmp_path: Path) -> None:
     file = put(tmp_path / "energy.csv", Path(ENERGY).read_bytes())
     assert run("extract", ENERGY, "-o", str(file)).exit_code == 2

@@ -138,9 +138,61 @@ def test_a_refusal_names_what_was_given_and_the_cure(
 
 
 def test_a_margin_longer_than_the_flight_is_named_as_the_reason() -> None:
-    text = find_line("no pair to use", "suggest", "--margin", "1", MATSUM)
-    assert text.startswith("the margin 1 after the load and before the contact leaves")
+    question = ("--margin", "0.4", "--part", "flying", MATSUM)
+    text = find_line("no pair to use", "suggest", *question)
+    assert text.startswith(
+        "the margin 0.4 after the load and before the contact leaves"
+    )
     assert text.endswith("give a smaller --margin")
+    text = find_line("why", "plan", *question)
+    assert text == (
+        "the margin 0.4 is longer than every flight; the longest lasts 0.293 (--margin)"
+    )
+
+
+@pytest.mark.parametrize(
+    "command", [("suggest",), ("plan",), ("verify", "--tr", "0.124", "--td", "0.37")]
+)
+@pytest.mark.parametrize("margin", ["0.2", "0.4"])
+def test_a_margin_longer_than_the_flight_leads_to_the_margin_of_the_run(
+    command: tuple[str, ...], margin: str
+) -> None:
+    step = find_line("next", *command, "--margin", margin, "--part", "flying", MATSUM)
+    line = f"d2rpick plan --part flying {MATSUM}"
+    assert step == f"let d2rpick derive the margin from the run with {line}"
+
+
+@pytest.mark.parametrize("command", ["suggest", "plan", "explore"])
+def test_a_margin_longer_than_the_record_is_refused(command: str) -> None:
+    result = run(command, "--margin", "5", MATSUM)
+    assert result.exit_code == 2
+    cause = "--margin 5 is longer than the record, 0.42; give a shorter time"
+    assert cause in result.stderr
+
+
+def test_a_margin_in_ms_is_refused_with_its_value_in_the_unit_of_the_record() -> None:
+    stderr = run("suggest", "--margin", "50", MATSUM).stderr
+    assert "was it meant in ms? Then give --margin 0.05, in the unit" in stderr
+
+
+@pytest.mark.parametrize("command", ["suggest", "plan", "explore"])
+def test_a_landing_before_every_flight_is_refused(command: str) -> None:
+    result = run(command, "--landing", "0.0379", "--part", "flying", MATSUM)
+    assert result.exit_code == 2
+    assert (
+        "--landing 0.0379 lies in no flight, the first of which lasts from 0.086 to 0.379"
+        in result.stderr
+    )
+    assert "give the time of the contact that ends a flight" in result.stderr
+
+
+def test_info_leads_to_the_later_restart_segments_that_were_not_named() -> None:
+    legs = [locate_stored(f"rollover_r100_T0{number}.gz") for number in (1, 2, 3)]
+    question = ("info", "--part", "box")
+    step = find_line("next", *question, legs[0])
+    line = shlex.join(("d2rpick", *question, *legs))
+    assert step == f"read the later restart segments too with {line}"
+    assert "info" not in find_line("next", *question, *legs)
 
 
 def test_without_part_energies_no_part_is_called_unable_to_be_switched() -> None:

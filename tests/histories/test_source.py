@@ -19,6 +19,7 @@ from d2rpick.histories.opening import Selection, open_run
 from d2rpick.histories.source import (
     expand,
     find_later_legs,
+    find_unread_legs,
     has_next_leg,
     open_files,
 )
@@ -218,6 +219,14 @@ def test_a_td_that_only_a_later_leg_reaches_names_it() -> None:
     assert first.replace("T01", "T02") in read_refusal(
         "suggest", "--td", "0.4", "--part", "box", first
     )
+
+
+@pytest.mark.usefixtures("here")
+def test_a_named_leg_is_read_however_its_folder_is_written() -> None:
+    for name in ("runT01", "runT02", "runT03"):
+        Path(name).touch()
+    assert find_unread_legs(["./runT01", "./runT02", "./runT03"]) == []
+    assert find_unread_legs(["./runT01", "./runT03"]) == ["runT02"]
 
 
 @pytest.mark.parametrize("suffix", ["", ".gz"])

@@ -205,6 +205,14 @@ class Situation:
             return self.expected_margin.time
         return self.settings.margin or 0.0
 
+    @property
+    def keeps_nothing_of_flight(self) -> bool:
+        """True if the margin after the load and before the contact leaves nothing of the flight."""
+        earliest_tr = self.earliest_tr
+        if not self.margin or earliest_tr is None:
+            return False
+        return earliest_tr >= self.latest_td
+
     @cached_property
     def together(self) -> PartsTogether:
         """Parts that vibrate together in the flight."""
@@ -299,7 +307,8 @@ def examine_td(
     Raises
     ------
     RangeError
-        If td, ``after`` or the fit window lie outside the record, or the record has fewer than 3 states.
+        If td, ``after`` or the fit window lie outside the record, if the margin is longer than the record, or if the
+        record has fewer than 3 states.
     """
     _check_times(history, td, settings)
     seen = find_seen_flight(history, td)
@@ -371,7 +380,7 @@ def _choose_time_of_fit(seen: Seen, td: float) -> float:
 
 
 def _check_times(history: History, td: float, settings: Settings) -> None:
-    """Raise RangeError for a record with fewer than `FEWEST_STATES`, and for times outside the record."""
+    """Raise RangeError for a record with fewer than `FEWEST_STATES`, times outside it, and a margin longer than it."""
     if history.time.size < FEWEST_STATES:
         if history.time.size == 1:
             count = "1 state was"
@@ -387,6 +396,8 @@ def _check_times(history: History, td: float, settings: Settings) -> None:
         history.check(settings.after, argument="after")
     if settings.landing is not None:
         history.check(settings.landing, argument="landing")
+    if settings.margin is not None:
+        history.check_length(settings.margin, argument="margin")
     if settings.replay and settings.fit_window:
         history.check(*settings.fit_window, argument="fit_window")
 

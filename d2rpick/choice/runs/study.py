@@ -35,6 +35,7 @@ from d2rpick.choice.pair.windows import (
     make_error_profile,
 )
 from d2rpick.choice.question import read_reference
+from d2rpick.histories.digits import format_distinctly
 from d2rpick.histories.names import Selection
 from d2rpick.histories.samples import draw_outline
 from d2rpick.histories.source import expand
@@ -569,8 +570,34 @@ def _explain_why_no_common(judged: Sequence[StudyRow]) -> str:
     suited = len(judged) - len(unsuited)
     return (
         f"no tr is admissible in all of {format_number_of_runs(len(judged))}; tr = {tr:.6g} is in {suited}, "
-        f"not in {list_names(unsuited, most=NAMED)}"
+        f"not in {list_names(unsuited, most=NAMED)}: {_explain_why_apart(judged, unsuited[0])}"
     )
+
+
+def _explain_why_apart(judged: Sequence[StudyRow], unsuited: str) -> str:
+    """Return why a run named ``unsuited`` shares no tr with all the others.
+
+    Only this run is compared with the others, because comparing every two of many runs would take long.
+    """
+    without = [row.source for row in judged if not row.acceptable.size]
+    if without:
+        return f"no tr at all is admissible in {list_names(without, most=NAMED)}"
+    apart = next(row for row in judged if row.source == unsuited)
+    for row in judged:
+        if not find_common_windows([apart.acceptable, row.acceptable]).size:
+            return (
+                f"tr is admissible in {_describe_intervals(apart)} and in {_describe_intervals(row)}: they do not "
+                "overlap"
+            )
+    return f"the intervals of {unsuited} overlap those of each other run, but at different times"
+
+
+def _describe_intervals(row: StudyRow) -> str:
+    """Return the number and the extent of the intervals of admissible tr of a run, in words."""
+    count = len(row.acceptable)
+    intervals = "1 interval" if count == 1 else f"{count} intervals"
+    first, last = format_distinctly((row.acceptable[0, 0], row.acceptable[-1, 1]))
+    return f"{intervals} of {row.source} from {first} to {last}"
 
 
 def _is_in_windows(windows: Samples, time: float) -> bool:

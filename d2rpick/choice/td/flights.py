@@ -15,10 +15,14 @@ from d2rpick.flight.flight import (
     list_witnesses,
 )
 from d2rpick.flight.window import list_moments
-from d2rpick.histories.digits import round_down_as_read, sum_times_as_read
+from d2rpick.histories.digits import (
+    format_distinctly,
+    round_down_as_read,
+    sum_times_as_read,
+)
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
 
     from d2rpick.choice.question import Settings
     from d2rpick.histories.history import History, Momenta, Samples
@@ -45,9 +49,11 @@ def find_longest_flight(
     Raises
     ------
     RangeError
-        If there is no flight and ``otherwise`` is not given.
+        If ``otherwise`` is not given, and there is no flight or the given landing lies before all flights.
     """
     flights = find_flights(history, settings)
+    if not otherwise:
+        refuse_landing_before_flights(history, flights, settings)
     if settings.landing is not None:
         last = _find_last_before(settings.landing, flights)
         if last:
@@ -121,8 +127,10 @@ def find_flights(history: History, settings: Settings) -> tuple[Flight, ...]:
     Raises
     ------
     RangeError
-        If the record has fewer than 3 states.
+        If the record has fewer than 3 states, or the margin is longer than the record.
     """
+    if settings.margin is not None:
+        history.check_length(settings.margin, argument="margin")
     landing = settings.landing
     if landing is None:
         return _add_given_start(
@@ -186,6 +194,21 @@ def _insert_flight(
             (*kept_flights, given_flight),
             key=lambda flight: flight.within(history.time),
         )
+    )
+
+
+def refuse_landing_before_flights(
+    history: History, flights: Sequence[Flight], settings: Settings
+) -> None:
+    """Raise RangeError if the given landing lies before all ``flights``, so that it ends none of them."""
+    landing = settings.landing
+    if landing is None or not flights or _find_last_before(landing, flights):
+        return
+    start, end = flights[0].within(history.time)
+    value, first, last = format_distinctly((landing, start, end))
+    raise RangeError(
+        f"{', '.join(history.source)}: `landing` {value} lies in no flight, the first of which lasts from {first} to "
+        f"{last}; give the time of the contact that ends a flight"
     )
 
 

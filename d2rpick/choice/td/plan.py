@@ -26,7 +26,12 @@ from d2rpick.choice.switched.switched_run import (
     prepare_switched_history,
     refuse_partly_rigid,
 )
-from d2rpick.choice.td.flights import MIN_RIGID, compute_last_td, find_flights
+from d2rpick.choice.td.flights import (
+    MIN_RIGID,
+    compute_last_td,
+    find_flights,
+    refuse_landing_before_flights,
+)
 from d2rpick.flight.internal_energy import round_off
 
 if TYPE_CHECKING:
@@ -80,6 +85,12 @@ class PlannedFlight(NamedTuple):
         else:
             pair = None
         return (pair.tr, pair.td) if pair else None
+
+    @property
+    def is_within_given_margin(self) -> bool:
+        """True if the margin given by the user leaves nothing of the flight."""
+        is_given = self.margin.source == "given"
+        return is_given and self.end - self.margin.time <= self.start
 
     @property
     def rigid_time(self) -> float | None:
@@ -211,7 +222,8 @@ def plan_run(
     Raises
     ------
     RangeError
-        If ``after`` or a window lies outside the record, or the parts were deformable in a done window.
+        If ``after`` or a window lies outside the record, if the margin is longer than the record, if ``landing`` lies
+        before all flights, or if the parts were deformable in a done window.
     """
     history = reference.history
     refuse_unsound(history, settings)
@@ -220,6 +232,7 @@ def plan_run(
     history, done_times, cautions = prepare_switched_history(reference, done)
     reference = reference._replace(history=history)
     flights = find_flights(history, settings)
+    refuse_landing_before_flights(history, flights, settings)
     # The earlier run may be a switched run, too.
     earlier = before and find_flights(prepare_switched_history(before, ())[0], settings)
     done_rows = find_done_windows(history, flights, done_times, earlier)
@@ -342,6 +355,11 @@ def _explain_short_window(rigid: float, shortest: float, margin: Margin) -> str:
         return (
             f"{TOO_SHORT}: a switch may shift the landing by more than the duration of the flight, so no margin before "
             "the contact is long enough; a given margin (`margin`) is used as it is"
+        )
+    if margin.source == "given" and rigid <= 0.0:
+        return (
+            f"{TOO_SHORT}: the margin {margin.time:.6g} before the contact leaves nothing of the flight; give a "
+            "smaller `margin`"
         )
     if margin.time:
         margin_text = f", with the margin {margin.time:.3g} before the contact"
