@@ -56,7 +56,15 @@ DECK_OF_ANOTHER_MODEL = (
         ),
         (
             f"verify --switched {MATSUM} {ENERGY}",
-            "so no part seems to have been rigid; give the run with the switching cards, or --tr and --td",
+            "so they seem to be runs of different models; give the switched run of this model",
+        ),
+        (
+            "verify --switched sample_data/oscillator sample_data/oscillator_switched",
+            "sample_data/oscillator/OSCT01.gz was not switched: exchange them, so that --switched names",
+        ),
+        (
+            f"verify --switched sample_data/oscillator_switched {MATSUM}",
+            "OSCT03.gz: runs of different models: part 1 is 'box' in the reference run",
         ),
         (
             "study nothing/*",
