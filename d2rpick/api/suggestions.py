@@ -338,13 +338,17 @@ def judge_pair(
     tr_is_read = tr is None
     windows: tuple[SwitchedWindow, ...] = ()
     if switched_reference:
+        from d2rpick.choice.switched.same_model import refuse_other_model
         from d2rpick.choice.switched.switch_times import (
             find_switched_windows,
             read_switch_times,
+            refuse_exchanged_runs,
         )
 
+        refuse_other_model(question.reference.run, switched_reference.run)
         history = question.reference.history
         windows = find_switched_windows(switched_reference, history)
+        refuse_exchanged_runs(question.reference, switched_reference, windows)
         if tr is None or td is None:
             tr, td = read_switch_times(switched_reference, history, windows, tr, td)
     assert tr is not None

@@ -123,9 +123,9 @@ def format_in_full(decision: Decision) -> str:
 
 
 def format_outlook(decision: Decision) -> str:
-    """Return what would improve a pair that is not good, and what to expect after td."""
+    """Return what would improve a pair, if anything is known to, and what to expect after td."""
     expectation = f"Expect: {describe_expectation(decision)}"
-    if decision.grade == GOOD:
+    if not decision.cure:
         return expectation
     return f"To improve: {decision.cure}. {expectation}"
 

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 from d2rpick.base.errors import list_names
 from d2rpick.histories.listings import WITH_AN_ERROR
 from d2rpick.histories.names import suggest_file
+from d2rpick.report.formats import RepeatedQuestion
+from d2rpick.report.next_step import name_step_after_switched_run
 from d2rpick.report.tables import make_positional, quote_shell_line
 from d2rpick.running.watch import News
 
@@ -54,28 +56,41 @@ def describe_news(
     """
     selected = ("--part", ",".join(parts)) if parts else ()
     nothing_read = News()
-    news, is_over, plan = nothing_read, False, ""
+    news, is_over, step = nothing_read, False, ""
     for news_before, news in pairwise(chain([nothing_read], reads)):
-        files = make_positional((*names, *news.later_files))
-        plan = quote_shell_line(("d2rpick", "plan", *selected, *files))
+        step = _name_step_after_end(news, (*names, *news.later_files), selected)
         if news.now != news_before.now:
             is_over = False
         if news.ending or news.silence:
             is_over = True
-        yield from _describe_states(news_before, news, plan)
+        yield from _describe_states(news_before, news, step)
         for event in news.events:
             yield _describe_event(event, is_past=is_over)
-        yield from _describe_end(news_before, news, plan)
-    yield _describe_last_state(news, names, plan if is_over else "")
+        yield from _describe_end(news_before, news, step)
+    yield _describe_last_state(news, names, step if is_over else "")
 
 
-def _describe_states(news_before: News, news: News, plan: str) -> Iterator[Event]:
+def _name_step_after_end(
+    news: News, files: Sequence[str], selected: tuple[str, ...]
+) -> str:
+    """Return the step after the run has ended: choose times, or compare a switched run with its reference run.
+
+    ``selected`` is the option with the chosen parts; empty if no parts were chosen.
+    """
+    if news.was_switched:
+        question = RepeatedQuestion(parts=selected, files=tuple(files))
+        return name_step_after_switched_run(question)
+    words = ("d2rpick", "plan", *selected, *make_positional(files))
+    return f"choose times with {quote_shell_line(words)}"
+
+
+def _describe_states(news_before: News, news: News, step: str) -> Iterator[Event]:
     """Report that the run has begun, or that it was restarted."""
     now, last_time = news.now, news_before.now
     if now is None:
         return
     if last_time is None:
-        yield Event("begun", news.start, now, _describe_first_read(news, plan))
+        yield Event("begun", news.start, now, _describe_first_read(news, step))
     elif now < last_time or news.undone_events:
         message = (
             f"the run was restarted: it was at {last_time:.6g} and is now at {now:.6g}"
@@ -88,8 +103,8 @@ def _describe_states(news_before: News, news: News, plan: str) -> Iterator[Event
             yield Event("expected", contacts[0], now, message)
 
 
-def _describe_first_read(news: News, plan: str) -> str:
-    """Report how far the run is at the first read; if it seems over, refer to the command ``plan``."""
+def _describe_first_read(news: News, step: str) -> str:
+    """Report how far the run is at the first read; if it seems over, name the next ``step``."""
     reached = f"the run has reached {news.now:.6g}"
     if news.ending:
         message = f"{reached} and has ended {news.ending}"
@@ -99,7 +114,9 @@ def _describe_first_read(news: News, plan: str) -> str:
         )
     else:
         return reached
-    return f"choose times with {plan}: {message}, so the events below are past"
+    if news.was_switched:
+        step = "this run was switched"
+    return f"{step}: {message}, so the events below are past"
 
 
 def _describe_event(event: RunEvent, *, is_past: bool) -> Event:
@@ -160,7 +177,7 @@ def _describe_advice(event: RunEvent, wait: Wait) -> str:
     )
 
 
-def _describe_end(news_before: News, news: News, plan: str) -> Iterator[Event]:
+def _describe_end(news_before: News, news: News, step: str) -> Iterator[Event]:
     """Report once that the run has ended, and from time to time that it writes nothing."""
     if news.ending and not news_before.ending:
         keyword = "failed" if news.ending == WITH_AN_ERROR else "ended"
@@ -168,14 +185,14 @@ def _describe_end(news_before: News, news: News, plan: str) -> Iterator[Event]:
         yield Event(keyword, news.now, news.now, message)
     if news.silence:
         message = (
-            f"nothing was written for {news.silence:.0f} s. If the run is over, choose times with {plan}; "
+            f"nothing was written for {news.silence:.0f} s. If the run is over, {step}; "
             "d2rpick follow ends with Ctrl+C, or with --once or --for"
         )
         yield Event("silent", news.now, news.now, message)
 
 
-def _describe_last_state(news: News, names: Sequence[str], plan: str) -> Event:
-    """State whether the parts are flying now, and since when; ``plan`` is the next command if the run is over."""
+def _describe_last_state(news: News, names: Sequence[str], step: str) -> Event:
+    """State whether the parts are flying now, and since when; ``step`` is the next step once the run is over, or ""."""
     if news.now is None:
         similar = "" if any(map(os.path.exists, names)) else suggest_file(names[0])
         message = f"{list_names(names)}: no file of a run yet{similar}; check the name if the run has begun"
@@ -187,8 +204,14 @@ def _describe_last_state(news: News, names: Sequence[str], plan: str) -> Event:
         since, message = news.flight.start, f"flies since {news.flight.start:.6g}"
     elif news.flight is not None:
         message = f"no flight since {news.flight.end:.6g}"
-    if plan:
-        message += f"; choose times with {plan}"
+    elif step:
+        message = "no flight was seen during the run"
+        if not news.was_switched:
+            message += "; d2rpick plan judges the whole record, which may show one"
+    if step and news.was_switched:
+        message += f"; this run was switched: {step}"
+    elif step:
+        message += f"; {step}"
     if since is None and not news.knows_wait:
         message += "; the force-free time that marks a flight is unknown: give `wait`"
     return Event("state", since, news.now, message)

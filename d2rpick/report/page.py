@@ -523,10 +523,11 @@ def build_solver_input(
     if decision.verdict != DO_NOT_USE:
         return build_section(title, *contents)
     badge = make_element("span", decision.verdict, class_="badge refused")
+    cure = f" To improve: {decision.cure}." if decision.cure else ""
     return build_section(
         title,
         make_element("p", badge),
-        make_element("p", f"{decision.reason}. To improve: {decision.cure}."),
+        make_element("p", f"{decision.reason}.{cure}"),
         make_element(
             "details",
             make_element("summary", "Show the card that must not be used"),

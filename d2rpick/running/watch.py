@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.errors import FormatError, HistoryError, RangeError
+from d2rpick.choice.switched.frozen import find_frozen_times
 from d2rpick.histories.listings import find_ending
 from d2rpick.histories.source import expand, find_later_legs
 from d2rpick.running.events import find_events
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 
     from d2rpick.base.errors import D2RPickError
     from d2rpick.deck.model import Inventory
+    from d2rpick.histories.history import History
     from d2rpick.histories.names import Selection
     from d2rpick.running.events import RunEvent
     from d2rpick.running.witness import SeenFlight
@@ -57,6 +59,8 @@ class News(NamedTuple):
         Latest flight; None if there is none yet.
     knows_wait : bool
         True if the waiting time is known, i.e. the force-free time after which a flight is detected.
+    was_switched : bool
+        True if the events or the frozen energy show that parts were made rigid during the run.
     later_files : tuple of str
         Files of later restart segments that were read although the user did not name them.
     ending : str or None
@@ -73,6 +77,7 @@ class News(NamedTuple):
     undone_events: tuple[RunEvent, ...] = ()
     flight: SeenFlight | None = None
     knows_wait: bool = False
+    was_switched: bool = False
     later_files: tuple[str, ...] = ()
     ending: str | None = None
     silence: float | None = None
@@ -153,8 +158,14 @@ class Watch:
             undone_events=events_before[kept_count:],
             flight=flights[-1] if flights else None,
             knows_wait=wait is not None,
+            was_switched=self._was_switched(evidence.history),
             later_files=tuple(find_later_legs(expand(self._names))),
         )
+
+    def _was_switched(self, history: History) -> bool:
+        """Return True if the events or the frozen energy of the history show that parts were made rigid."""
+        is_seen = any(event.event == "rigid" for event in self._events)
+        return is_seen or bool(find_frozen_times(history))
 
 
 def follow(

@@ -9,9 +9,11 @@ from d2rpick.base.errors import RangeError
 from d2rpick.base.spans import Times
 from d2rpick.choice.question import Reference, read_reference
 from d2rpick.choice.switched.comparison import Comparison, compare_runs
+from d2rpick.choice.switched.same_model import refuse_other_model
 from d2rpick.choice.switched.switch_times import (
     find_switched_windows,
     read_switch_times,
+    refuse_exchanged_runs,
     sort_windows,
 )
 from d2rpick.choice.switched.switched_run import prepare_switched_history
@@ -144,6 +146,42 @@ def test_parts_that_deform_have_to_be_left_out_by_name(tmp_path: Path) -> None:
         read_switch_times(switched, reference.history, windows, None, None)
 
 
+def test_runs_whose_parts_have_other_titles_are_refused(tmp_path: Path) -> None:
+    """Part 1 is another part in each run, so no number of the comparison would mean anything."""
+    box = read_run(tmp_path / "box", {"box": SWING})
+    car = read_run(tmp_path / "car", {"engine": SWING}, *WINDOWS)
+    titles = "part 1 is 'box' in the reference run and 'engine' in the switched run"
+    with pytest.raises(RangeError, match=f"runs of different models: {titles}; give"):
+        refuse_other_model(box.run, car.run)
+    refuse_other_model(car.run, car.run)
+
+
+def test_exchanged_runs_are_to_be_exchanged(tmp_path: Path) -> None:
+    """Only the run that is given as the reference run was ever rigid."""
+    reference = read_run(tmp_path / "reference", {"engine": SWING})
+    switched = read_run(
+        tmp_path / "switched", {"engine": freeze(SWING, *WINDOWS)}, *WINDOWS
+    )
+    windows = find_switched_windows(reference, switched.history)
+    with pytest.raises(RangeError, match=r"rigid from 0\.\d+ to 0\..*exchange them"):
+        refuse_exchanged_runs(switched, reference, windows)
+    for first in (reference, switched):
+        windows = find_switched_windows(switched, first.history)
+        refuse_exchanged_runs(first, switched, windows)
+
+
+def test_the_other_model_is_the_only_reason_why_no_window_is_found(
+    tmp_path: Path,
+) -> None:
+    reference = read_run(tmp_path / "reference", {"engine": SWING})
+    other = read_run(tmp_path / "other", {"engine": 3 * SWING})
+    with pytest.raises(RangeError, match="different models; give the switched run"):
+        read_switch_times(other, reference.history, (), None, None)
+    same = read_run(tmp_path / "same", {"engine": 1.1 * SWING})
+    with pytest.raises(RangeError, match="rigid; give the run with the switching card"):
+        read_switch_times(same, reference.history, (), None, None)
+
+
 def make_history(energy: Samples) -> History:
     return History(TIME, energy, source=("run",), format="csv", channel="E")
 
@@ -173,7 +211,9 @@ def test_a_wrong_energy_of_rigid_solids_is_not_that_of_another_model(
     comparison = compare(switched, (0.3 + late, 0.5))
     assert not [text for text in comparison.objections if "different models" in text]
     different = compare(np.where(TIME < 0.2, 2 * SWING, switched), (0.3, 0.5))
-    assert [text for text in different.objections if "different models" in text]
+    assert different.is_other_model
+    (objection,) = different.objections
+    assert objection.endswith("so they seem to be runs of different models")
 
 
 def test_energies_that_the_solver_reports_wrongly_are_not_compared() -> None:

@@ -80,7 +80,9 @@ def test_the_next_command_and_the_notes_name_every_restart_segment() -> None:
     last = later.replace("T02", "T03")
     followed = run("follow", "--once", first).stdout
     shown = " ".join(followed.split())
-    assert f"choose times with d2rpick plan {first} {later} {last}" in shown
+    files = (first, later, last)
+    switched = " ".join(f"--switched {file}" for file in files)
+    assert f"d2rpick verify {switched} REFERENCE" in shown
     note = f"{later}, {last} in the same folder were not read"
     assert any(note in text for text in run_json("info", first)["notes"])
     both = run_json("info", first, later)["notes"]

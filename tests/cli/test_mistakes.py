@@ -56,7 +56,15 @@ DECK_OF_ANOTHER_MODEL = (
         ),
         (
             f"verify --switched {MATSUM} {ENERGY}",
-            "so no part seems to have been rigid; give the run with the switching cards, or --tr and --td",
+            "so they seem to be runs of different models; give the switched run of this model",
+        ),
+        (
+            "verify --switched sample_data/oscillator sample_data/oscillator_switched",
+            "sample_data/oscillator/OSCT01.gz was not switched: exchange them, so that --switched names",
+        ),
+        (
+            f"verify --switched sample_data/oscillator_switched {MATSUM}",
+            "OSCT03.gz: runs of different models: part 1 is 'box' in the reference run",
         ),
         (
             "study nothing/*",
@@ -282,6 +290,23 @@ def test_a_switched_run_that_ends_rigid_is_not_blamed_on_td() -> None:
     answer = read_refusal("verify", "--part", "box", *switched, BOX)
     assert "while the parts are still rigid" in answer
     assert "give a finished switched run" in answer
+
+
+def test_energies_of_another_model_are_the_only_reason_and_lead_to_the_right_run() -> (
+    None
+):
+    """The table names no parts, so only the energies before tr show that the model is another one."""
+    other = locate_stored("oscillator_S4_ref.csv.gz")
+    switched = ("--switched", "sample_data/oscillator_switched")
+    verify = ("verify", "--tr", "0.02", "--td", "0.05", *switched, other)
+    answer = run_json(*verify)
+    (reason,) = answer["reasons"]
+    assert reason.endswith("so they seem to be runs of different models")
+    assert answer["switched"]["objections"] == [reason]
+    assert answer["verdict_reason"] == reason
+    step = "give the switched run of this model as --switched"
+    assert answer["cure"].replace("`switched`", "--switched") == step
+    assert f"next        {step}" in run(*verify).stdout
 
 
 def test_a_deck_of_the_other_solver_is_named_with_the_history() -> None:

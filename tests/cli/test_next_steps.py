@@ -217,13 +217,34 @@ def test_a_complete_run_is_not_called_cut_because_another_is_longer() -> None:
 
 
 def test_after_the_comparison_with_a_switched_run_none_is_asked_for() -> None:
-    cause = Cause(
-        "unknown", "write more often, or compare with a finished switched run"
+    assert (
+        omit_comparison_from(
+            "write more often, or compare with a finished switched run"
+        )
+        == "write more often"
     )
-    grade = Grade("poor", (cause,))
+
+
+def test_after_the_comparison_with_a_switched_run_no_parts_are_asked_for() -> None:
+    """The switched run shows which parts were rigid, so the advice leads to no other answer."""
+    name_parts = (
+        "name the parts to be switched with `parts`, if the files contain parts"
+    )
+    for beginning, expected in (("", ""), ("write more often, ", "write more often")):
+        cure = f"{beginning}{name_parts}"
+        assert omit_comparison_from(cure) == expected
+        assert (
+            omit_comparison_from(f"{cure}, or compare with a finished switched run")
+            == expected
+        )
+
+
+def omit_comparison_from(cure: str) -> str:
+    """Return the cure that remains after a comparison."""
+    grade = Grade("poor", (Cause("unknown", cure),))
     quality = omit_comparison(Quality(grade, grade, grade))
-    cures = {cause.cure for cause in (*quality.causes, *quality.alone.causes)}
-    assert cures == {"write more often"}
+    (remaining,) = {cause.cure for cause in (*quality.causes, *quality.alone.causes)}
+    return remaining
 
 
 @pytest.mark.slow

@@ -163,3 +163,33 @@ def test_the_command_for_a_finished_run_can_be_typed() -> None:
     reads = [News(start=0.0, now=1.0, ending="normally")]
     begun, *_ = describe_news(reads, ["-a run"], ("box", "3"))
     assert "d2rpick plan --part box,3 -- '-a run'" in begun.message
+
+
+def test_a_switched_run_that_is_over_is_left_to_the_comparison() -> None:
+    """Plan would refuse it, or answer with the same comparison, since its times were chosen before."""
+    folder = ROOT / "sample_data/oscillator_switched"
+    events = follow_once(folder)
+    step = f"d2rpick verify --switched {folder} REFERENCE (the reference run instead of REFERENCE)"
+    assert events[-1].message.endswith(
+        f"; this run was switched: compare this run with its reference run: {step}"
+    )
+    assert events[0].message.startswith("this run was switched: the run has reached")
+    assert not [event for event in events if "d2rpick plan" in event.message]
+
+
+def test_the_comparison_keeps_the_parts_and_names_every_file() -> None:
+    news = News(0.0, 1.0, was_switched=True, later_files=("T02",), ending="normally")
+    *_, state = describe_news([news], ["T01"], ("box",))
+    command = "d2rpick verify --switched T01 --switched T02 --part box REFERENCE"
+    assert command in state.message
+
+
+def test_a_run_that_is_over_is_not_said_to_fly_later() -> None:
+    news = News(0.0, 1.0, knows_wait=True, ending="normally")
+    *_, state = describe_news([news], ["T01"], ())
+    assert state.message == (
+        "no flight was seen during the run; d2rpick plan judges the whole record, which may show one; "
+        "choose times with d2rpick plan T01"
+    )
+    *_, state = describe_news([news._replace(ending=None)], ["T01"], ())
+    assert state.message == "no flight yet"

@@ -4,7 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from d2rpick.choice.pair.quality import COMPARE, MORE_OFTEN, NAME_PARTS, OR_COMPARE
+from d2rpick.choice.pair.quality import (
+    COMPARE,
+    MORE_OFTEN,
+    NAME_PARTS,
+    NAME_PARTS_IF_ANY,
+    OR_COMPARE,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -17,10 +23,16 @@ _VERIFY_PARTS: Final = (
 
 
 def omit_comparison(quality: Quality) -> Quality:
-    """Return the grades without the advice to compare with a switched run, for use after this comparison."""
+    """Return the grades without the advice to compare with a switched run, for use after this comparison.
+
+    The advice to name parts is omitted too, because the switched run shows which parts were rigid.
+    """
 
     def omit(cure: str) -> str:
-        return MORE_OFTEN if cure == COMPARE else cure.removesuffix(OR_COMPARE)
+        if cure == COMPARE:
+            return MORE_OFTEN
+        cure = cure.removesuffix(OR_COMPARE).removesuffix(NAME_PARTS_IF_ANY)
+        return cure.removesuffix(", ")
 
     return _edit_cures(quality, omit)
 

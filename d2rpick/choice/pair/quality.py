@@ -79,6 +79,7 @@ _NOISE_DEVIATIONS: Final = 4.0
 _WRONG_BY_MORE: Final = "the vibration after td is wrong by more than"
 MORE_OFTEN: Final = "write the energies more often"
 NAME_PARTS: Final = "name the parts to be switched with `parts`"
+NAME_PARTS_IF_ANY: Final = f"{NAME_PARTS}, if the files contain parts"
 CHOOSE_TIMES_IN_FLIGHT: Final = "choose tr and td in one flight"
 _CORRECT_THE_DECK: Final = "correct the deck, and run the reference again"
 _CHECK_GIVEN_TIMES: Final = (
@@ -584,7 +585,7 @@ def _describe_cure_for_modes(situation: Situation) -> str:
     if others_are_springs:
         return ""
     if situation.history.parts is None and not other_parts:
-        return f"{NAME_PARTS}, if the files contain parts"
+        return NAME_PARTS_IF_ANY
     if other_parts:
         names = list_names([part.name for part in other_parts], most=_NAMED)
         vibrates = "it vibrates" if len(other_parts) == 1 else "they vibrate"

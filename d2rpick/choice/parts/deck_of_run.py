@@ -87,7 +87,7 @@ def describe_other_model(run: OpenedRun, inventory: Inventory) -> str:
     differing = [
         part
         for part in titled
-        if _is_different_title(part.title, _get_title_in_deck(part, inventory))
+        if is_different_title(part.title, _get_title_in_deck(part, inventory))
     ]
     difference = (
         _describe_differing(differing, inventory)
@@ -112,7 +112,7 @@ def warn_about_titles(parts: Iterable[Part], inventory: Inventory) -> Iterator[C
         part
         for part in parts
         if part.id in inventory.parts
-        and _is_different_title(part.title, _get_title_in_deck(part, inventory))
+        and is_different_title(part.title, _get_title_in_deck(part, inventory))
     ]
     if differing:
         yield Caution(
@@ -234,7 +234,7 @@ def _get_title_in_deck(part: Part, inventory: Inventory) -> str:
     return inventory.parts[part.id].title
 
 
-def _is_different_title(first_title: str, second_title: str) -> bool:
+def is_different_title(first_title: str, second_title: str) -> bool:
     """Return True if two titles differ apart from spaces and case; one title may be a truncated form of the other.
 
     Non-ASCII letters are not compared, because the files of a run may encode them in different ways.

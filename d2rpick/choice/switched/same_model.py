@@ -1,4 +1,4 @@
-"""Check that a switched run and its reference run agree while both are deformable."""
+"""Check that a switched run and its reference run have the same parts, and agree while both are deformable."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.base.errors import list_names
+from d2rpick.base.errors import RangeError, list_names
+from d2rpick.choice.parts.deck_of_run import is_different_title
 from d2rpick.choice.switched.frozen import FEWEST
 from d2rpick.flight.internal_energy import round_off
 
@@ -14,11 +15,35 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from d2rpick.histories.history import History
+    from d2rpick.histories.run import OpenedRun
 
 # Runs belong to the same model if their energies before the switch differ by at most this fraction [-].
 _OF_ANOTHER_MODEL: Final = 0.2
 # The motions of both runs are treated as equal if the momenta differ by at most this fraction [-].
 MOST_MOMENTUM_ERROR: Final = 0.05
+
+
+def refuse_other_model(reference: OpenedRun, switched: OpenedRun) -> None:
+    """Raise RangeError if most of the parts with the same id have different titles in the two runs."""
+    parts = {part.id: part for part in reference.parts if part.title}
+    pairs = [
+        (parts[part.id], part)
+        for part in switched.parts
+        if part.id in parts and part.title
+    ]
+    differing = [
+        (expected, part)
+        for expected, part in pairs
+        if is_different_title(expected.title, part.title)
+    ]
+    if 2 * len(differing) <= len(pairs):
+        return
+    expected, part = differing[0]
+    titles = f"{expected.title!r} in the reference run and {part.title!r} in the switched run"
+    raise RangeError(
+        f"{', '.join(switched.sources)}: runs of different models: part {part.id} is {titles}; give the switched run "
+        "of this model"
+    )
 
 
 def check_same_model(

@@ -12,7 +12,11 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from d2rpick.base.errors import RangeError, format_ranges, list_names
-from d2rpick.choice.switched.frozen import FEWEST, compute_energy_range
+from d2rpick.choice.switched.frozen import (
+    FEWEST,
+    compute_energy_range,
+    find_frozen_times,
+)
 from d2rpick.choice.switched.same_model import check_same_model
 from d2rpick.choice.switched.switched_run import find_absent_windows
 from d2rpick.flight.internal_energy import round_off
@@ -100,6 +104,27 @@ def find_switched_windows(
     return tuple(windows)
 
 
+def refuse_exchanged_runs(
+    reference: Reference, switched: Reference, windows: Sequence[SwitchedWindow]
+) -> None:
+    """Raise RangeError if the reference run was switched, and the switched run has no rigid ``windows``."""
+    if windows or find_frozen_times(switched.history):
+        return
+    rigid = [
+        (window.start, window.end)
+        for window in find_absent_windows(reference)
+        if window.whole or window.is_frozen
+    ] or find_frozen_times(reference.history)
+    if not rigid:
+        return
+    spans = list_names([f"{start:.6g} to {end:.6g}" for start, end in rigid])
+    raise RangeError(
+        f"{', '.join(reference.history.source)}: this is the switched run, rigid from {spans}, and "
+        f"{', '.join(switched.history.source)} was not switched: exchange them, so that `switched` names the "
+        "switched run"
+    )
+
+
 def read_switch_times(
     switched: Reference,
     reference: History,
@@ -155,11 +180,13 @@ def sort_windows(windows: Sequence[SwitchedWindow], pair: Times) -> SwitchedWind
 def _explain_why_no_times(switched: Reference, reference: History) -> RangeError:
     """Return the error that explains why no rigid window of a switched run is found."""
     early = reference.start + _EARLY * reference.duration
-    reason, cure = _explain_missing_window(switched, reference)
     history = switched.history
-    reason = "; ".join((*check_same_model(reference, history, early), reason))
+    source = ", ".join(history.source)
+    for reason in check_same_model(reference, history, early):
+        return RangeError(f"{source}: {reason}; give the switched run of this model")
+    reason, cure = _explain_missing_window(switched, reference)
     cure = history.left_beside or f"; {cure}"
-    return RangeError(f"{', '.join(history.source)}: {reason}{cure}")
+    return RangeError(f"{source}: {reason}{cure}")
 
 
 def _ask_for_parts(switched: History, window: SwitchedWindow) -> RangeError:
