@@ -26,7 +26,6 @@ from d2rpick.choice.pair.decision import (
     CHECK_SWITCHED_RUN,
     CHOOSE_ANOTHER,
     GIVE_END_OF_LOAD,
-    GIVE_RUN_OF_MODEL,
     Decision,
     decide,
 )
@@ -112,8 +111,6 @@ class PairVerdict(AnswerAtTd):
     @property
     def _cure_of_objections(self) -> str:
         """Advice on a pair that is not admissible."""
-        if self.switched is not None and self.switched.is_other_model:
-            return GIVE_RUN_OF_MODEL
         if self._is_refuted:
             return CHECK_SWITCHED_RUN
         flight = self.situation.flight
@@ -174,15 +171,13 @@ class PairVerdict(AnswerAtTd):
 
     @property
     def _is_refuted(self) -> bool:
-        """True if the finished switched run is of another model, or contradicts the recommended pair.
+        """True if the finished switched run contradicts the pair that the reference run recommends.
 
         A switched run tests the recommended pair if its tr differs from that of the pair by no more than the timing
         tolerance.
         """
         if self.switched is None or not self.switched.objections:
             return False
-        if self.switched.is_other_model:
-            return True
         good = self._good_pair
         if good is None:
             return False

@@ -6,7 +6,6 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.base.errors import list_names, make_printable
-from d2rpick.choice.pair.decision import GIVE_RUN_OF_MODEL
 from d2rpick.choice.pair.grades import DO_NOT_USE, GOOD
 from d2rpick.choice.pair.warnings import POOR_RESIDUAL
 from d2rpick.choice.switched.same_model import MOST_MOMENTUM_ERROR
@@ -132,9 +131,7 @@ def list_next_step(
     question = display.question
     decision = answer.decision
     situation = answer.situation
-    if answer.switched and answer.switched.is_other_model:
-        step = GIVE_RUN_OF_MODEL
-    elif decision.verdict == DO_NOT_USE:
+    if decision.verdict == DO_NOT_USE:
         if answer.switched and not answer.switched.objections:
             otherwise = _USE_MOTION_OF_SWITCHED_RUN
         elif decision.best_of or situation.flight.start is None:

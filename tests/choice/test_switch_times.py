@@ -211,9 +211,7 @@ def test_a_wrong_energy_of_rigid_solids_is_not_that_of_another_model(
     comparison = compare(switched, (0.3 + late, 0.5))
     assert not [text for text in comparison.objections if "different models" in text]
     different = compare(np.where(TIME < 0.2, 2 * SWING, switched), (0.3, 0.5))
-    assert different.is_other_model
-    (objection,) = different.objections
-    assert objection.endswith("so they seem to be runs of different models")
+    assert [text for text in different.objections if "different models" in text]
 
 
 def test_energies_that_the_solver_reports_wrongly_are_not_compared() -> None:

@@ -292,23 +292,6 @@ def test_a_switched_run_that_ends_rigid_is_not_blamed_on_td() -> None:
     assert "give a finished switched run" in answer
 
 
-def test_energies_of_another_model_are_the_only_reason_and_lead_to_the_right_run() -> (
-    None
-):
-    """The table names no parts, so only the energies before tr show that the model is another one."""
-    other = locate_stored("oscillator_S4_ref.csv.gz")
-    switched = ("--switched", "sample_data/oscillator_switched")
-    verify = ("verify", "--tr", "0.02", "--td", "0.05", *switched, other)
-    answer = run_json(*verify)
-    (reason,) = answer["reasons"]
-    assert reason.endswith("so they seem to be runs of different models")
-    assert answer["switched"]["objections"] == [reason]
-    assert answer["verdict_reason"] == reason
-    step = "give the switched run of this model as --switched"
-    assert answer["cure"].replace("`switched`", "--switched") == step
-    assert f"next        {step}" in run(*verify).stdout
-
-
 def test_a_deck_of_the_other_solver_is_named_with_the_history() -> None:
     deck = str(ROOT / "sample_data/rollover_box.k")
     warnings = run_json("suggest", "--deck", deck, "--part", "box", BOX)["warnings"]

@@ -36,11 +36,9 @@ if TYPE_CHECKING:
 
 # CHOOSE_ANOTHER: advice if a pair is not admissible.
 # GIVE_END_OF_LOAD: advice if no flight is found.
-# GIVE_RUN_OF_MODEL: advice if a finished switched run seems to be of another model.
 # CHECK_SWITCHED_RUN: advice if a finished switched run contradicts the verdict on a recommended pair.
 CHOOSE_ANOTHER: Final = "choose another pair (d2rpick suggest names one)"
 GIVE_END_OF_LOAD: Final = "if you know the end of the load, give it as `after`"
-GIVE_RUN_OF_MODEL: Final = "give the switched run of this model as `switched`"
 CHECK_SWITCHED_RUN: Final = (
     "check that the switched run was switched at these times and is otherwise identical to the reference run; "
     "if so, choose another td"

@@ -50,8 +50,6 @@ def add_comparison(
         min_mean,
     )
     interval = _find_output_interval(switched.history, tr) if tr_is_read else None
-    # The times of another model say nothing about the reference run.
-    reasons = () if comparison.is_other_model else verdict.reasons
     return replace(
         verdict,
         switched=comparison,
@@ -60,7 +58,7 @@ def add_comparison(
         tr_interval=interval,
         # If the switched run deviates too much, the pair is inadmissible, whatever the reference run shows.
         admissible=verdict.admissible and not comparison.objections,
-        reasons=reasons + comparison.objections,
+        reasons=verdict.reasons + comparison.objections,
         cautions=(*verdict.cautions, *warn_about_engine(switched.run.sources)),
     )
 

@@ -52,10 +52,9 @@ _UNKNOWN_WINDOWS: Final = SwitchedWindows(None)
 class Comparison(NamedTuple):
     """Differences between a switched run and its reference run; unknown quantities are None.
 
-    The fields are the keys of the JSON output, except the last four: ``min_mean`` is the smallest expected ratio of
+    The fields are the keys of the JSON output, except the last three: ``min_mean`` is the smallest expected ratio of
     the means [-], ``has_energy`` is False if the energies after td are not compared, because they are only round-off or
-    all wrong, ``misreported`` contains the names of the parts for which the solver reports a wrong energy after td, and
-    ``is_other_model`` is True if the runs seem to be of different models, which is then the only objection.
+    all wrong, and ``misreported`` contains the names of the parts for which the solver reports a wrong energy after td.
 
     ``energy_frozen`` is the energy of the switched run at td, ``energy_td`` that of the reference run. ``rigid_from``
     and ``rigid_to`` are the first and last states of the window around the middle of (tr, td) in which the energy of
@@ -87,7 +86,6 @@ class Comparison(NamedTuple):
     min_mean: float = 0.0
     has_energy: bool = True
     misreported: tuple[str, ...] = ()
-    is_other_model: bool = False
 
 
 def compare_with_reference(
@@ -133,11 +131,8 @@ def compare_with_reference(
         windows=windows,
     )
     others = (*windows.earlier, *windows.later)
-    objections = comparison.objections
-    if not comparison.is_other_model:
-        objections = (*judged.objections, *objections)
     return comparison._replace(
-        objections=objections,
+        objections=(*judged.objections, *comparison.objections),
         notes=(*judged.notes, *comparison.notes),
         other_windows=tuple((window.tr, window.td) for window in others),
         misreported=judged.misreported,
@@ -199,10 +194,10 @@ def compare_runs(
     limit = _find_limit_of_change(reference, switched, tr, td)
     rigid = _find_rigid_window(switched, pair, limit, windows)
     first_rigid = min(rigid[0] if rigid else tr, tr)
-    other_model = tuple(
-        check_same_model(reference, switched, min(first_rigid, windows.first_rigid))
-    )
-    objections = [*_check_rigid_window(reference, switched, rigid, tr, td, limit)]
+    objections = [
+        *check_same_model(reference, switched, min(first_rigid, windows.first_rigid)),
+        *_check_rigid_window(reference, switched, rigid, tr, td, limit),
+    ]
     differing = [
         *_check_before_window(reference, switched, momenta, windows, first_rigid)
     ]
@@ -230,11 +225,10 @@ def compare_runs(
         displacement=_compute_distance(*centres, td, after.end),
         rigid_from=rigid and rigid[0],
         rigid_to=rigid and rigid[1],
-        objections=other_model or tuple(objections),
+        objections=tuple(objections),
         notes=tuple(notes),
         min_mean=min_mean,
         has_energy=is_reported and mean_reference > rounding,
-        is_other_model=bool(other_model),
     )
 
 
