@@ -316,7 +316,7 @@ def _find_attached_parts(
     null_space = left_vectors[:, values <= _CANCELS * values[0]]
     projector = (null_space @ null_space.T) / np.outer(moving_sizes, moving_sizes)
     chosen_rows = [moving.index(i) for i in chosen if i in moving]
-    # In the projector, the parts of a body have equal entries, and those of different bodies have zeros.
+    # Entries of the projection matrix are equal for parts of one body, and zero for parts of different bodies.
     own_entries = np.diag(projector)[chosen_rows, np.newaxis]
     is_joined = (projector[chosen_rows] > own_entries / 2).any(axis=0)
     joined = np.array(moving)[is_joined].tolist()
@@ -330,7 +330,7 @@ def _refine_attached_parts(
     total = rests[sorted(members)].sum(axis=0)
     free = [i for i in moving if i not in chosen]
     while free:
-        # A member would be removed from the sum, any other part added.
+        # A part of the set is removed from the sum; any other part is added to it.
         signs = np.array([-1.0 if i in members else 1.0 for i in free])
         changes = signs[:, np.newaxis] * rests[free]
         sizes = np.linalg.norm(total + changes, axis=1)

@@ -28,7 +28,7 @@ _WORKBOOKS: Final = (".xlsx", ".xlsm", ".xls", ".ods")
 def choose_history_format(
     name: str | None, formats: Sequence[str], asked: str | None = None
 ) -> str:
-    """Return the ``asked`` format or, by default, that of a file name; csv if there is no name.
+    """Return the requested format (``asked``) or, by default, the format of a file name; csv if there is no name.
 
     The suffix determines the format.  A name that has no known suffix must be or contain the name of a solver's
     database.

@@ -91,11 +91,12 @@ def _compute_mean_ratio(
 ) -> float:
     """Return the mean energy after td relative to the reference run [-]."""
     static_td = max(energy_td - vibration.elastic_td, 0.0)
-    elastic_tr = vibration.elastic_tr
-    if elastic_tr is None:
-        elastic_tr = energy_tr - static_td
-    elastic_tr = min(max(elastic_tr, 0.0), max(energy_tr, 0.0))
-    static_tr = static_td if vibration.elastic_tr is None else energy_tr - elastic_tr
+    if vibration.elastic_tr is None:
+        static_tr = static_td
+        elastic_tr = max(energy_tr - static_td, 0.0)
+    else:
+        elastic_tr = min(vibration.elastic_tr, max(energy_tr, 0.0))
+        static_tr = energy_tr - elastic_tr
     reference = static_td + vibration.whole / 2
     if reference > 0:
         return (static_tr + elastic_tr / 2) / reference
