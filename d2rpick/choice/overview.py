@@ -202,7 +202,7 @@ def _describe_flights(flights: Sequence[tuple[str, FreeFlight]]) -> str:
     """Describe the number of flights and the duration of the longest flight."""
     longest = max(flight.end - flight.start for _, flight in flights)
     count = f"{len(flights)} free flight{'s' * (len(flights) > 1)}"
-    return f"{count}, the longest for {longest:.6g}"
+    return f"{count}; the longest lasts {longest:.6g}"
 
 
 def _describe_health(health: Health | None) -> str:

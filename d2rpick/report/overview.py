@@ -104,8 +104,8 @@ _PARTS_HEAD = ("part", "title", "highest internal energy")
 # Whether times can be chosen from the record. The verdict on a pair uses similar words, so the sentence names the
 # record, and leaves the verdict on its windows to `plan`.
 _RECORD: Final = {
-    USE: "can be used to choose times: it has flights, and d2rpick plan judges their windows",
-    USE_WITH_CARE: "can be used with care to choose times: it has flights, and d2rpick plan judges their windows",
+    USE: "can be used to choose times: it has flights, and d2rpick plan judges the windows in them",
+    USE_WITH_CARE: "can be used with care to choose times: it has flights, and d2rpick plan judges the windows in them",
     DO_NOT_USE: "do not use it to choose times",
 }
 _NOT_JUDGED: Final = (

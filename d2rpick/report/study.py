@@ -340,7 +340,7 @@ def _count_verdicts(answer: StudyOfRuns) -> str:
     return ", ".join(
         [
             *counted,
-            *[f"no pair in {format_number_of_runs(undecided_count)}"]
+            *[f"no verdict in {format_number_of_runs(undecided_count)}"]
             * (undecided_count > 0),
         ]
     )
