@@ -20,6 +20,7 @@ from d2rpick.api.request import (
 from d2rpick.base.errors import ArgumentError, DeckError, make_printable
 from d2rpick.base.options import FRACTION, NOT_NEGATIVE, Option
 from d2rpick.cli import options
+from d2rpick.cli.missing import list_needs_of_pair
 from d2rpick.cli.options import (
     ANSWER,
     DECK,
@@ -290,7 +291,7 @@ def explore(
     _finish_answer(output, question, decision, question.settings.min_quality)
 
 
-@options.make_command
+@options.make_command_with_needs(list_needs_of_pair)
 @options.make_time_option(
     "--tr", "Switch to rigid at this time.  [default: read from the run of --switched]"
 )

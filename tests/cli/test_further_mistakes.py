@@ -24,9 +24,42 @@ SWITCHING = str(ROOT / "sample_data" / "switching.k")
         ),
         (
             ("verify", "--tr", "0.01", ENERGY),
-            "give --td too, or a finished switched run as --switched",
+            "missing: --td T (or --switched FILE, a finished switched run)",
         ),
-        (("verify", ENERGY), "give --tr and --td, or a finished switched run"),
+        (
+            ("verify", ENERGY),
+            "missing: --tr T and --td T (or --switched FILE, a finished switched run)",
+        ),
+        (("first",), "missing: DECK (main deck of the run); --output-dir DIR (folder"),
+        (
+            ("first", DECK),
+            "missing: --output-dir DIR (folder for the copy); --part (parts to switch); --wait (force-free time",
+        ),
+        (
+            ("card", "--solver", "radioss", "--tr", "0.01"),
+            (
+                "missing: --td T (or --windows FILE, with lines 'tr td'); --node IDS (main nodes of the rigid bodies); "
+                "--end T (end"
+            ),
+        ),
+        (
+            ("drive", str(ROOT / "sample_data" / "falling_plate" / "plate_0000.rad")),
+            (
+                "missing: -o RUNDIR (folder of the run); --starter 'CMD {deck}' and --engine 'CMD {deck}' "
+                "(or OPENRADIOSS_PATH, the folder of OpenRadioss); --part IDS (parts to switch)"
+            ),
+        ),
+        (
+            ("replay", "--mass", "1", "--beta", "1"),
+            (
+                "missing: --stiffness NUMBER (spring stiffness k); --t-end T (last time); --dt T (output interval); "
+                "--v0 NUMBER, or some of"
+            ),
+        ),
+        (
+            ("verify",),
+            "missing: HISTORY (file, folder or quoted pattern of the run); --tr",
+        ),
         (
             ("check", "--td", "0.2", SWITCHING),
             "The times are those of the deck; d2rpick verify judges other times",
