@@ -416,8 +416,35 @@ def explain_error(error: BaseException, inputs: Sequence[str] = ()) -> str:
 
         click.echo("".join(traceback.format_exception(error)), err=True, nl=False)
     if isinstance(error, FORESEEN):
-        return replace_arguments(format_in_one_line(error))
+        return name_options(format_in_one_line(error))
     return f"{list_names(inputs)}{': ' * bool(inputs)}{format_in_one_line(error)}; --debug shows where"
+
+
+def name_options(text: str) -> str:
+    """Replace argument names with the options of the current command.
+
+    A file that belongs to another option is named with this option, or without a cure if the command has none.
+    """
+    text = replace_arguments(text)
+    for option in ("history", "deck"):
+        cure = f", and this file as --{option}"
+        if cure in text:
+            text = text.replace(cure, _name_place(option))
+    return text
+
+
+def _name_place(name: str) -> str:
+    """Return where the current command takes a history or a deck; empty if it takes none."""
+    context = click.get_current_context()
+    command: click.Command | None = context.command
+    if isinstance(command, click.Group):
+        command = command.get_command(context, context.invoked_subcommand or "")
+    for parameter in command.params if command else ():
+        if parameter.name == name:
+            is_option = isinstance(parameter, click.Option)
+            place = f"--{name}" if is_option else name.upper()
+            return f", and this file as {place}"
+    return ""
 
 
 def encode_text(text: str) -> bytes:
@@ -433,7 +460,7 @@ def name_options_and_wrap(text: str, form: str, width: int = 0) -> str:
     >>> name_options_and_wrap("choose with `energy`", "table")
     'choose with --energy'
     """
-    text = replace_arguments(text)
+    text = name_options(text)
     if form != "table" or not width:
         return text
     from d2rpick.report.tables import wrap_lines  # Imported here to keep start-up fast.

@@ -100,6 +100,70 @@ def test_a_deck_without_keywords_is_described(
     assert f"main.k: {problem}; an LS-DYNA deck" in run("check", str(deck)).stderr
 
 
+@pytest.mark.parametrize(
+    ("channel", "expected"),
+    [
+        ("mass=356", ", not a value (--mass takes that of the oscillator model)"),
+        ("kinetic_energy=356", ""),
+    ],
+)
+def test_a_value_in_place_of_a_column_is_refused(channel: str, expected: str) -> None:
+    """Before, a column of the usual name was used in its place without a word."""
+    answer = run("suggest", "--channel", channel, ENERGY)
+    assert answer.exit_code == 2
+    assert (
+        f"--channel {channel}: the name of a column was expected{expected}; no column "
+        "'356'; there are: 1 'time'"
+    ) in answer.stderr
+    parts = run("suggest", "--channel", channel, "--part", "box", MATSUM)
+    assert f"column was expected{expected}, and there are only columns" in parts.stderr
+
+
+SAMPLES = ROOT / "sample_data"
+
+
+@pytest.mark.parametrize(
+    ("name", "title"),
+    [
+        ("energy.csv", "a table of numbers"),
+        ("energy.glstat", "a glstat of LS-DYNA"),
+        ("rollover_box.matsum", "a matsum of LS-DYNA"),
+        ("rollover_box.binout", "a binout of LS-DYNA"),
+        ("rollover_box.h5", "an HDF5 file"),
+        ("rollover_boxT01", "a T01 of Radioss"),
+        ("rolloverT01.gz", "a T01 of Radioss"),
+    ],
+)
+def test_a_history_in_place_of_a_deck_is_named_with_its_option(
+    name: str, title: str
+) -> None:
+    history = str(SAMPLES / name)
+    wrong = (
+        f"{name}: this is {title}, a deck was expected; give the main deck of the run"
+    )
+    times = ("--tr", "0.1", "--td", "0.2", "--part", "1")
+    for arguments, place in (
+        (("check", history), ", and this file as --history"),
+        (("card", *times, "--deck", history), ", and this file as --history"),
+        (("plan", "--deck", history, MATSUM), ", and this file as HISTORY"),
+        (("first", history, "--part", "1", "--wait", "1", "-o", "new"), ""),
+    ):
+        answer = run(*arguments)
+        assert answer.exit_code == 2
+        assert answer.stderr.endswith(f"{wrong}{place}\n")
+
+
+def test_a_deck_in_place_of_a_history_is_named_with_its_option() -> None:
+    wrong = "name the glstat, matsum, binout or T01 of its run"
+    for arguments, place in (
+        (("suggest", DECK), ", and this file as --deck"),
+        (("check", DECK, "--history", DECK), ", and this file as DECK"),
+        (("extract", DECK), ""),
+        (("study", DECK), ""),
+    ):
+        assert run(*arguments).stderr.endswith(f"{wrong}{place}\n")
+
+
 def test_weights_that_are_not_text_name_the_command_that_writes_them(
     tmp_path: Path,
 ) -> None:

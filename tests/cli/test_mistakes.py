@@ -48,7 +48,7 @@ DECK_OF_ANOTHER_MODEL = (
         ),
         (
             f"suggest --channel kinetic=total_energy {MATSUM}",
-            "unknown quantity 'kinetic' (did you mean 'kinetic_energy'?), one of ",
+            "unknown quantity 'kinetic' (did you mean 'kinetic_energy'?)",
         ),
         (
             "card --solver ls-dyn --tr 0.06 --td 0.07 --part 1",
