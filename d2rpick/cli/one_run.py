@@ -216,11 +216,15 @@ def _finish_answer(
     question: RunQuestion,
     decision: VerdictOnPair | None,
     min_quality: str,
+    introduction: str = "",
 ) -> None:
-    """Exit with code 1 if the verdict is below ``min_quality``, or if a given deck was not used."""
+    """Exit with code 1 if the verdict is below ``min_quality``, or if a given deck was not used.
+
+    The message on the verdict begins with the ``introduction``.
+    """
     if question.unused_deck:
         output.finish_without_deck(question.unused_deck)
-    output.finish_by_verdict(decision, min_quality)
+    output.finish_by_verdict(decision, min_quality, introduction)
 
 
 @options.make_command
@@ -357,7 +361,16 @@ def verify(
     )
     if answer.switched and answer.switched.objections:
         output.finish_with_failed_comparison()
-    _finish_answer(output, question, answer.decision, question.settings.min_quality)
+    introduction = (
+        "the comparison is within its limits, but " if answer.switched else ""
+    )
+    _finish_answer(
+        output,
+        question,
+        answer.decision,
+        question.settings.min_quality,
+        introduction,
+    )
 
 
 @options.make_command

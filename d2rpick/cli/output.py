@@ -195,16 +195,22 @@ class Output:
             click.get_current_context().exit(OBJECTION)
 
     def finish_by_verdict(
-        self, decision: VerdictOnPair | None, min_quality: str
+        self,
+        decision: VerdictOnPair | None,
+        min_quality: str,
+        introduction: str = "",
     ) -> None:
-        """Exit with code 1 if there is no pair or its grade is below ``min_quality``; a message states the grade."""
+        """Exit with code 1 if there is no pair or its grade is below ``min_quality``; a message states the grade.
+
+        The message begins with the ``introduction``.
+        """
         if decision is None or decision.reaches(min_quality):
             self.finish(objection=decision is None)
             return
         if not self.exit_zero:
             verdict = f"the verdict is {decision.verdict!r} (grade {decision.grade})"
             tell(
-                f"d2rpick: exit code {OBJECTION}: {verdict}; --min-quality {decision.grade} accepts it"
+                f"d2rpick: exit code {OBJECTION}: {introduction}{verdict}; --min-quality {decision.grade} accepts it"
             )
         self.finish(objection=True)
 

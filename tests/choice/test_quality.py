@@ -16,6 +16,7 @@ from d2rpick.choice.pair.candidates import Candidate
 from d2rpick.choice.pair.grades import GRADES
 from d2rpick.choice.pair.quality import (
     EQUALLY_GOOD,
+    Cause,
     Errors,
     Grade,
     Quality,
@@ -25,6 +26,7 @@ from d2rpick.choice.pair.quality import (
     order_by_quality,
     rank_candidates,
     rank_judged,
+    trust_measured_momentum,
 )
 from d2rpick.choice.pair.situation import examine_td
 from d2rpick.choice.question import Settings
@@ -553,3 +555,23 @@ def test_a_given_flight_that_the_momentum_contradicts_is_not_advised_again(
     assert "although the momentum shows no free flight" in causes[0].reason
     assert "without `after`" in causes[0].cure
     assert "give the end of the load" not in causes[0].cure
+
+
+def test_a_measured_momentum_answers_the_doubt_about_an_unknown_load() -> None:
+    """A load that the record does not explain acts in both runs; other doubts about the motion remain."""
+    good = Grade("good")
+    load = Cause(
+        "a load acts", "give the deck", is_of_record=True, is_unknown_load=True
+    )
+    apart = Cause("the parts fly apart", "switch fewer parts")
+    for causes, grade in (
+        ((load,), "fair"),
+        ((load, apart), "poor"),
+        ((apart,), "poor"),
+    ):
+        quality = Quality(Grade("poor", causes), good, good)
+        assert trust_measured_momentum(quality).motion.grade == grade
+    trusted = trust_measured_momentum(Quality(Grade("poor", (load,)), good, good))
+    assert trusted.reasons == (
+        "a load acts, but the momentum of the computed run agrees",
+    )

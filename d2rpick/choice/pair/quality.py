@@ -273,7 +273,8 @@ class Cause(NamedTuple):
     each pair of the record, so that other times do not help unless the record or the deck is improved, or other parts
     are chosen. ``kind`` is the reason without the numbers of this pair, by default the reason itself; tables state it
     once for several pairs. ``better_parts`` contains values of `parts` for which the cause does not apply.
-    ``needs_deck`` is True if the deck of the run may remove the cause.
+    ``needs_deck`` is True if the deck of the run may remove the cause. ``is_unknown_load`` is True if an unknown load
+    may change the motion.
     """
 
     reason: str
@@ -283,6 +284,7 @@ class Cause(NamedTuple):
     is_of_record: bool = False
     better_parts: tuple[str, ...] = ()
     needs_deck: bool = False
+    is_unknown_load: bool = False
 
     @property
     def general_reason(self) -> str:
@@ -308,12 +310,14 @@ _UNKNOWN_MASS: Final = Cause(
     "write the mass, or the kinetic and internal energy, or give the file with the energies of the parts (LS-DYNA "
     "matsum, Radioss T01)",
     is_of_record=True,
+    is_unknown_load=True,
 )
 _UNKNOWN_LOAD: Final = Cause(
     "gravity or another load changes momentum or energy in the flight",
     "give the deck of the run as `deck`, because it defines gravity and loads, or write the part momenta",
     is_of_record=True,
     needs_deck=True,
+    is_unknown_load=True,
 )
 # The cause if the user gave the deck, but its loads do not explain the change of momentum or energy.
 _UNKNOWN_LOAD_WITH_DECK: Final = _UNKNOWN_LOAD._replace(
@@ -487,6 +491,25 @@ def refuse_error(quality: Quality, errors: Sequence[str]) -> Quality:
     cause = first._replace(reason=reason)
     refused = alone._replace(causes=(cause, *others))
     return quality._replace(vibration=refused, alone=refused)
+
+
+def trust_measured_momentum(quality: Quality) -> Quality:
+    """Return the grades of a pair whose computed switched run has the momentum of the reference run after td.
+
+    A load that the record does not explain acts in both runs, so it makes the motion no worse than "fair".
+    """
+    motion = quality.motion
+    if not motion.causes or not all(cause.is_unknown_load for cause in motion.causes):
+        return quality
+    causes = tuple(
+        cause._replace(
+            reason=f"{cause.reason}, but the momentum of the computed run agrees",
+            is_of_record=False,
+            needs_deck=False,
+        )
+        for cause in motion.causes
+    )
+    return quality._replace(motion=Grade(FAIR, causes))
 
 
 def _list_causes_for_poor(
