@@ -190,13 +190,13 @@ def test_what_the_files_show_of_two_models_is_the_first_reason(tmp_path: Path) -
     both = read_run(tmp_path / "both", {"engine": SWING, "car": SWING})
     assert explain_difference(engine.run, both.run) == ""
     bar = read_reference([str(ROOT / "sample_data" / "oscillator" / "OSCT01.gz")])
-    box = read_reference([str(ROOT / "sample_data" / "rollover_boxT01")])
-    short = read_reference([str(ROOT / "sample_data" / "rolloverT01.gz")])
+    box = read_reference([str(ROOT / "sample_data" / "rolloverT01.gz")])
+    switched = read_reference([locate_stored("rollover_r100_T0*.gz")])
     assert explain_difference(bar.run, box.run) == (
-        "the runs belong to different models (the mass of part 1 'bar' is 0.00157 in the reference run and 350 in the "
+        "the runs belong to different models (the mass of part 1 'bar' is 0.00157 in the reference run and 374.4 in the "
         "switched run)"
     )
-    assert explain_difference(box.run, short.run) == (
+    assert explain_difference(box.run, switched.run) == (
         "the loads or velocities differ, but the masses of the parts do not"
     )
 
