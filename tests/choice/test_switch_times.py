@@ -193,8 +193,8 @@ def test_what_the_files_show_of_two_models_is_the_first_reason(tmp_path: Path) -
     box = read_reference([str(ROOT / "sample_data" / "rolloverT01.gz")])
     switched = read_reference([locate_stored("rollover_r100_T0*.gz")])
     assert explain_difference(bar.run, box.run) == (
-        "the runs belong to different models (the mass of part 1 'bar' is 0.00157 in the reference run and 374.4 in the "
-        "switched run)"
+        "the runs belong to different models (the mass of part 1 'bar' is 0.00157 in the reference run and 374.4 in "
+        "the switched run)"
     )
     assert explain_difference(box.run, switched.run) == (
         "the loads or velocities differ, but the masses of the parts do not"

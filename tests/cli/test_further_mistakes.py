@@ -4,7 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.command import ENERGY, MATSUM, ROOT, put, run
+from tests.command import ENERGY, MATSUM, ROOT, put, run, run_json
+from tests.computed import locate_stored
 
 DECK = str(ROOT / "sample_data" / "rollover_box.k")
 SWITCHING = str(ROOT / "sample_data" / "switching.k")
@@ -220,3 +221,39 @@ def test_an_energy_of_zero_leads_to_the_choice_of_another_column(
     file = put(tmp_path / "zero.csv", f"time,internal_energy\n{rows}")
     answer = " ".join(run("suggest", "--td", "0.3", str(file)).stdout.split())
     assert "next choose the internal energy as --energy; d2rpick info" in answer
+
+
+def test_no_flight_is_assumed_across_a_missing_restart_segment() -> None:
+    """Before, the parts were said to fly from 0.09 to 0.38 in a run whose second of three segments is missing."""
+    legs = [locate_stored(f"rollover_r100_T0{leg}.gz") for leg in (1, 3)]
+    first_screen = " ".join(run("info", *legs).stdout.split())
+    assert first_screen.startswith(
+        "record can be used with care to choose times: it has flights, and d2rpick plan judges their windows why there "
+        "are no states from 0.0999564 to 0.370008: a restart segment may be missing, and no flight is assumed"
+    )
+    flights = run_json("info", *legs)["flights"]
+    assert [(flight["start"], flight["end"]) for flight in flights] == [
+        (pytest.approx(0.0898529), pytest.approx(0.0999564)),
+        (pytest.approx(0.382904), None),
+    ]
+    across = run("verify", "--part", "box", "--tr", "0.0915", "--td", "0.3707", *legs)
+    assert "tr before the states go on at 0.370008 (is a restart segment missing?)" in (
+        " ".join(across.stdout.split())
+    )
+    inside = run("suggest", "--part", "box", "--td", "0.2", *legs)
+    assert "there are no states from 0.0999564 to 0.370008, around td = 0.2" in (
+        inside.stderr
+    )
+
+
+def test_a_table_written_less_often_for_a_while_keeps_its_flight(
+    tmp_path: Path,
+) -> None:
+    """Only a single interval that is much longer than its neighbours is a gap."""
+    rows = (SAMPLES / "energy.csv").read_text().splitlines()
+    thinned = [*rows[:600], *rows[600:900:40], *rows[900:]]
+    table = put(tmp_path / "thinned.csv", "\n".join(thinned).encode() + b"\n")
+    assert "restart segment" not in run("info", str(table)).output
+    cut = put(tmp_path / "cut.csv", "\n".join([*rows[:600], *rows[900:]]).encode())
+    (flight, *_) = run_json("info", str(cut))["flights"]
+    assert flight["end"] == pytest.approx(float(rows[599].split(",")[0]))
