@@ -56,16 +56,6 @@ def _name_parameter(ctx: click.Context, parameter: click.Parameter) -> str:
     return f"{max(parameter.opts, key=len)} {name} ({meaning[0].lower()}{meaning[1:]})"
 
 
-def list_needs_of_pair(values: Mapping[str, Any]) -> Iterable[str]:
-    """Yield the times that ``verify`` lacks."""
-    if values.get("switched"):
-        return
-    times = [name for name in ("tr", "td") if values.get(name) is None]
-    if times:
-        names = " and ".join(f"--{name} T" for name in times)
-        yield f"{names} (or --switched FILE, a finished switched run)"
-
-
 def list_needs_of_motion(values: Mapping[str, Any]) -> Iterable[str]:
     """Yield the options for which ``replay`` has alternatives, none of which was given."""
     if values.get("frame_mass") is None and values.get("beta") is None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -20,7 +20,6 @@ from d2rpick.api.request import (
 from d2rpick.base.errors import ArgumentError, DeckError, make_printable
 from d2rpick.base.options import FRACTION, NOT_NEGATIVE, Option
 from d2rpick.cli import options
-from d2rpick.cli.missing import list_needs_of_pair
 from d2rpick.cli.options import (
     ANSWER,
     DECK,
@@ -44,6 +43,8 @@ from d2rpick.cli.values import CARDS
 from d2rpick.report.formats import FORMATS, WrittenDeck, write
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
     from d2rpick.api.asked import RunQuestion
     from d2rpick.api.cards import Cards
     from d2rpick.api.judged_cards import JudgedCard
@@ -295,7 +296,17 @@ def explore(
     _finish_answer(output, question, decision, question.settings.min_quality)
 
 
-@options.make_command_with_needs(list_needs_of_pair)
+def _list_needs_of_pair(values: Mapping[str, Any]) -> Iterable[str]:
+    """Yield the times that ``verify`` lacks."""
+    if values.get("switched"):
+        return
+    times = [name for name in ("tr", "td") if values.get(name) is None]
+    if times:
+        names = " and ".join(f"--{name} T" for name in times)
+        yield f"{names} (or --switched FILE, a finished switched run)"
+
+
+@options.make_command_with_needs(_list_needs_of_pair)
 @options.make_time_option(
     "--tr", "Switch to rigid at this time.  [default: read from the run of --switched]"
 )

@@ -24,7 +24,6 @@ from d2rpick.base.errors import ArgumentError
 from d2rpick.base.options import TIME, Option, list_options, make_option_name
 from d2rpick.base.settings import find_nearest_settings
 from d2rpick.cli import Documented, make_documented
-from d2rpick.cli.missing import explain_missing
 from d2rpick.cli.output import Output, encode_text, tell
 from d2rpick.cli.times import TimeType, convert_typed_times
 from d2rpick.cli.values import (
@@ -122,7 +121,8 @@ class Command(Documented):
             # click omits the context, without which the message cannot say what the option means.
             error.ctx = error.ctx or ctx
             raise
-        self._refuse_missing(ctx, ctx)
+        if self._list_needs:
+            self._refuse_missing(ctx, ctx)
         if words := list_words(ctx):
             ctx.meta["d2rpick.command"] = insert_options(
                 ctx.meta["d2rpick.command"], words
@@ -140,6 +140,9 @@ class Command(Documented):
         """Raise UsageError if a required parameter or something else that the command needs is not ``given``."""
         if ctx.meta[_SETTINGS_ONLY]:
             return
+        # Imported here to keep start-up fast.
+        from d2rpick.cli.missing import explain_missing
+
         if message := explain_missing(ctx, given.params, self._list_needs):
             raise click.UsageError(message, ctx)
 
