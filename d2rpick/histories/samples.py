@@ -30,6 +30,11 @@ _LONG: Final = 30.0
 _FEWEST_AROUND_HOLE: Final = 4
 # Number of states whose time steps are compared at a time, so that these states fit into the processor cache.
 _PIECE: Final = 1 << 15
+# Smallest number of changes from state to state that can be told from noise.
+_FEWEST_OF_NOISE: Final = 40
+# _STRONGEST: fraction of the spectral lines that are treated as the strongest [-].
+# _POWER_OF_LINES: smallest fraction of the power in these lines if a vibration causes it [-]; white noise has 0.4.
+_STRONGEST, _POWER_OF_LINES = 0.1, 0.6
 # Number of adjacent windows that form one window on the next level of the search table.
 _TOGETHER: Final = 8
 # A root has converged if its time changes by at most this fraction [-], which is about the rounding error.
@@ -320,6 +325,27 @@ def find_turns(energy: Samples) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
     moving = np.flatnonzero(slope)
     turn = np.flatnonzero(np.diff(slope[moving]))
     return moving[turn] + 1, slope[moving[turn]] > 0
+
+
+def changes_at_random(energy: Samples) -> bool:
+    """Return True if the changes of an energy from state to state are noise rather than a fast vibration.
+
+    A vibration has its power in few spectral lines. Noise has it in all lines, so that its strongest lines hold little
+    of it. ``energy`` has shape (n,).
+
+    Examples
+    --------
+    >>> states = np.arange(1000)
+    >>> changes_at_random(np.cos(2.1 * states)), changes_at_random(np.random.default_rng(1).random(1000))
+    (False, True)
+    """
+    changes = np.diff(energy)
+    if changes.size < _FEWEST_OF_NOISE:
+        return False
+    window = np.hanning(changes.size)
+    power = np.abs(np.fft.rfft((changes - changes.mean()) * window)) ** 2
+    strongest = np.sort(power)[-round(_STRONGEST * power.size) :]
+    return float(strongest.sum()) < _POWER_OF_LINES * float(power.sum())
 
 
 def _compare_sides(values: Samples, limits: Samples | float) -> NDArray[np.int8]:

@@ -29,6 +29,7 @@ from d2rpick.choice.pair.warnings import (
     POOR_RESIDUAL,
     list_times_outside_flight,
 )
+from d2rpick.histories.samples import changes_at_random
 from d2rpick.histories.surroundings import UNKNOWN
 from d2rpick.vibration.identify import MIN_PLASTIC, MIN_SAMPLES_PER_PERIOD
 from d2rpick.vibration.measures import TOLERATED_GROWTH
@@ -300,6 +301,11 @@ _NEGATIVE_ENERGY: Final = Cause(
     "the energy becomes negative, which an internal energy never does",
     "name the internal energy with `energy` or `parts`",
 )
+_NOISE: Final = Cause(
+    "noise hides the vibration: most changes of the energy from state to state are random",
+    "name an energy with less noise, such as that of the parts, or a file with more digits (binout)",
+    is_of_record=True,
+)
 _UNKNOWN_OUTSIDE: Final = Cause(
     "the error of the vibration is unknown, because tr or td lies outside the flight",
     CHOOSE_TIMES_IN_FLIGHT,
@@ -529,7 +535,7 @@ def _list_causes_for_poor(
     if _is_energy_negative(*record):
         causes.append(_NEGATIVE_ENERGY)
     if situation.basis == "energy":
-        causes += _list_causes_of_record(*record)
+        causes += list_causes_of_record(*record)
     causes += _list_causes_of_static_change(situation, best)
     return causes
 
@@ -660,14 +666,18 @@ def _describe_wrong_vibration(situation: Situation, residual: float) -> Cause:
 
 
 @remember
-def _list_causes_of_record(
+def list_causes_of_record(
     history: History, start: float | None, td: float
 ) -> tuple[Cause, ...]:
     """Return the reasons why the states of the flight up to td do not suffice to determine the energy level."""
     _, energy = history.between(-np.inf if start is None else start, td)
     causes = []
     states = count_states_per_period(energy)
-    if states is not None and states < MIN_SAMPLES_PER_PERIOD:
+    if states is None or states >= MIN_SAMPLES_PER_PERIOD:
+        return ()
+    if changes_at_random(energy):
+        causes.append(_NOISE)
+    else:
         states_text = f"the energy has {states:.3g} states per period"
         causes.append(
             Cause(
