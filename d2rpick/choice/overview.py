@@ -94,6 +94,7 @@ class Overview(NamedTuple):
     the output that would show the flights of single parts; None if it is written, or there is no state.  ``deck`` is
     the main deck of the run that was used, and ``selection`` the columns and parts that the user chose.  ``rigid`` are
     the windows in which parts are rigid.  ``never_flies`` is True if the momentum shows no flight at any time.
+    ``holes`` are the intervals without states [time].
     """
 
     source: tuple[str, ...]
@@ -120,6 +121,7 @@ class Overview(NamedTuple):
     rigid: tuple[Times, ...] = ()
     never_flies: bool = False
     energies: tuple[str, ...] = ()
+    holes: tuple[Times, ...] = ()
 
     @property
     def verdict(self) -> str:
@@ -180,6 +182,12 @@ class Overview(NamedTuple):
             doubts.insert(
                 0,
                 f"parts are rigid from {when}, so only later flights can be planned",
+            )
+        if self.holes:
+            doubts.insert(
+                0,
+                f"there are no states from {_list_times(self.holes)}: a restart segment may be missing, and no flight "
+                "is assumed across this gap",
             )
         if not self.complete:
             doubts.append(
@@ -276,6 +284,7 @@ def describe_run(
         rigid=rigid,
         never_flies=history is not None and denies_every_flight(history),
         energies=energies,
+        holes=history.holes if history else (),
     )
 
 

@@ -121,11 +121,17 @@ def test_limits_that_are_kept_do_not_praise_a_pair_that_is_not_to_be_used() -> N
     result = run(*SWITCHED[:2], "--max-residual", "0.01", *SWITCHED[2:])
     assert result.exit_code == 1
     text = join_lines(result.stdout)
-    assert text.startswith("do not use tr = ")
     assert "passed" not in text
-    decided, compared = text.split(" comparison ")
+    compared, decided = text.split(" do not use tr = ")
     assert "why residual 0.0386 above the limit 0.01" in decided
-    assert compared.startswith("within limits: mean energy after td 108% of the")
+    assert "next use at most the motion of this switched run, up to the next" in decided
+    assert compared.startswith(
+        "comparison within limits, although the pair was poor: mean energy after td 108% of the"
+    )
+    assert (
+        "exit code 1: the comparison is within its limits, but the verdict is 'do not use'"
+        in result.stderr
+    )
     assert (
         "this does not show that the vibration is kept: standard deviation of the energy after td 2.12, in the "
         "reference run 2.08" in compared

@@ -43,6 +43,10 @@ CHECK_SWITCHED_RUN: Final = (
     "check that the switched run was switched at these times and is otherwise identical to the reference run; "
     "if so, choose another td"
 )
+# GIVE_SWITCHED_RUN_OF_MODEL: advice if the switched run differs from the reference run before the switch.
+GIVE_SWITCHED_RUN_OF_MODEL: Final = (
+    "give the switched run of this model, with the same loads and velocities"
+)
 # _USE_BEST: advice if the best pair in the given range of td can be used with care.
 # _AVOID_BEST: advice if even the best pair in the given range of td cannot be used.
 _USE_BEST: Final = (
