@@ -27,8 +27,7 @@ from d2rpick.choice.health import (
     warn_about_health,
 )
 from d2rpick.choice.pair.grades import DO_NOT_USE, USE, USE_WITH_CARE
-from d2rpick.choice.pair.situation import FEWEST_STATES
-from d2rpick.choice.question import Reference, Settings
+from d2rpick.choice.question import FEWEST_STATES, Reference, Settings
 from d2rpick.choice.switched.frozen import find_frozen_times
 from d2rpick.choice.switched.switched_run import (
     find_rigid_times,
