@@ -1,6 +1,6 @@
 """The indexes of the frequently asked questions: each question with a link, and the bold text of its answer.
 
-``python -m tests.questions`` writes them to docs/how-to: start-faq.md (first steps), faq.md (planning a switch),
+``python -m tests.questions`` writes them to docs/how-to: start-faq.md (first steps), files-faq.md (files), faq.md (planning),
 model-faq.md (the model), switched-faq.md (cards and switched run) and scripts-faq.md (scripts, CI, many runs), so that
 each can be scanned at a glance; a test holds them current.
 """
@@ -21,6 +21,7 @@ _PREFIX: Final = "Frequently asked questions: "
 # Titles of the indexes, and labels of their pages, in the order of the lists.
 INDEXES: Final = {
     "start-faq": f"{_PREFIX}installation and first steps",
+    "files-faq": f"{_PREFIX}the files of a run",
     "faq": f"{_PREFIX}planning a switch",
     "model-faq": f"{_PREFIX}your model",
     "switched-faq": f"{_PREFIX}cards and switched run",
@@ -31,9 +32,12 @@ PAGES: Final = {
         "faq-start": "Start",
         "faq-work": "Use at work",
     },
-    "faq": {
+    "files-faq": {
         "faq-files": "Files",
+        "faq-formats": "Formats",
         "faq-reading": "Reading the run",
+    },
+    "faq": {
         "faq-answer": "Answer",
         "faq-terms": "Terms",
         "faq-times": "Times",
