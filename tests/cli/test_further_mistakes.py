@@ -228,8 +228,8 @@ def test_no_flight_is_assumed_across_a_missing_restart_segment() -> None:
     legs = [locate_stored(f"rollover_r100_T0{leg}.gz") for leg in (1, 3)]
     first_screen = " ".join(run("info", *legs).stdout.split())
     assert first_screen.startswith(
-        "record can be used with care to choose times: it has flights, and d2rpick plan judges their windows why there "
-        "are no states from 0.0999564 to 0.370008: a restart segment may be missing, and no flight is assumed"
+        "record can be used with care to choose times: it has flights, and d2rpick plan judges the windows in them "
+        "why there are no states from 0.0999564 to 0.370008: a restart segment may be missing, and no flight is assumed"
     )
     flights = run_json("info", *legs)["flights"]
     assert [flight["start"] > 0.37 for flight in flights] == [True]
