@@ -33,6 +33,7 @@ from d2rpick.choice.pair.decision import (
 from d2rpick.choice.pair.grades import GOOD, POOR
 from d2rpick.choice.pair.quality import (
     EQUALLY_GOOD,
+    MOST_GOOD,
     ROUNDING,
     Quality,
     list_exceeded_limits,
@@ -55,7 +56,7 @@ from d2rpick.histories.balance import read_balance
 from d2rpick.histories.digits import round_as_read
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from d2rpick.choice.health import Health
     from d2rpick.choice.question import Reference, Settings
@@ -106,6 +107,9 @@ class PairVerdict(AnswerAtTd):
         decision = self._decide(None)
         if decision.grade == POOR:
             decision = self._decide(self.better)
+            if self.better is not None:
+                others = tuple(self._list_other_pairs(self.better))
+                decision = decision._replace(other_pairs=others)
         if self._is_refuted or self.is_of_other_run:
             return decision
         return compare_in_flight(decision, self.situation, self.candidate)
@@ -168,6 +172,23 @@ class PairVerdict(AnswerAtTd):
             return good
         decision = decide_with_better_pair(self._suggestion)
         return decision.better if decision and decision.better else good
+
+    def _list_other_pairs(self, better: Pair) -> Iterator[tuple[str, Pair]]:
+        """Yield the best pair at this td, and that of the flight if its residual is clearly smaller.
+
+        ``better`` is the pair that the verdict names first: the nearest good one, which may need another td.
+        """
+        good = self._good_pair
+        if good is not None and good.td == self.td != better.td:
+            yield "with the given td", good
+        if better.residual is None or better.residual <= MOST_GOOD:
+            return
+        choice = _choose_in_flight(self.situation)
+        best = choice.recommended if choice else None
+        if best is None or best.residual is None or best == better:
+            return
+        if better.residual - best.residual > EQUALLY_GOOD:
+            yield "best in the flight", best
 
     @cached_property
     def _suggestion(self) -> PairSuggestion:
