@@ -771,21 +771,32 @@ def suggest_in_run(
         answer = suggest_at(situation, with_better=with_better)
         if with_better:
             answer = _add_choice_in_flight(answer)
-    refuse_switched_flight(reference, answer.situation)
+    of_switched_run = refuse_switched_flight(reference, answer.situation)
+    answer = replace(answer, cautions=(*of_switched_run, *answer.cautions))
     return _add_health(answer, reference.run)
 
 
-def refuse_switched_flight(reference: Reference, situation: Situation) -> None:
-    """Raise RangeError if the parts, or some of them, were rigid in the flight up to td."""
+def refuse_switched_flight(
+    reference: Reference, situation: Situation
+) -> tuple[Caution, ...]:
+    """Raise RangeError if the parts, or some of them, were rigid in the flight up to td.
+
+    The result is a warning if they were rigid before the flight, or if the energy of one part seems to be frozen.
+    """
     # Imported here to keep start-up fast.
     from d2rpick.choice.switched.frozen import refuse_switched
 
     start, td = situation.flight.start, situation.td
     refuse_switched(situation.history, start, td)
-    if reference.run.parts:
-        from d2rpick.choice.switched.switched_run import refuse_partly_rigid
+    if not reference.run.parts:
+        return ()
+    from d2rpick.choice.switched.switched_run import (
+        refuse_partly_rigid,
+        warn_about_switched_run,
+    )
 
-        refuse_partly_rigid(reference, start, td)
+    windows = refuse_partly_rigid(reference, start, td)
+    return tuple(warn_about_switched_run(reference, windows, td))
 
 
 def _add_choice_in_flight(answer: PairSuggestion) -> PairSuggestion:
@@ -815,7 +826,8 @@ def verify_run(
     """Judge one pair (tr, td) of a reference run; see `verify_in_history` for ``earlier`` and the errors raised."""
     refuse_unsound(reference.history, settings, td, choosing=False)
     verdict = verify_in_history(reference.history, tr, td, settings, earlier)
-    refuse_switched_flight(reference, verdict.situation)
+    of_switched_run = refuse_switched_flight(reference, verdict.situation)
+    verdict = replace(verdict, cautions=(*of_switched_run, *verdict.cautions))
     return _add_health(verdict, reference.run)
 
 

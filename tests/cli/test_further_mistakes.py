@@ -287,3 +287,25 @@ def test_verify_names_the_best_pair_of_the_flight_beside_the_nearest(
     assert (
         best == "tr = 0.0725888, td = 0.3: vibration wrong by 20%, rigid for 0.227411"
     )
+
+
+def test_the_record_of_a_switched_run_is_called_one(tmp_path: Path) -> None:
+    """Not all parts were rigid, and the solver writes the kinetic energy of rigid parts, so only energies show it."""
+    switched = str(tmp_path / "switched.matsum")
+    times = ("--tr", "0.09", "--td", "0.37")
+    run("rollover", "--mesh", "4", *times, "-o", switched)
+    expected = "rigid-times: this is a switched run, with these rigid parts: box from 0.09 to 0.37; choose times from"
+    for question in (("suggest",), ("explore",), ("plan",), ("verify", *times)):
+        answer = run(*question, "--part", "flying", switched)
+        assert answer.stderr.count(expected) == 1
+    for unswitched in (MATSUM, str(SAMPLES / "rolloverT01.gz")):
+        assert (
+            "rigid-times" not in run("suggest", "--part", "flying", unswitched).stderr
+        )
+
+
+def test_a_flight_after_a_rigid_window_belongs_to_a_switched_run() -> None:
+    """All parts were rigid before the flight, so what the window froze changes its vibration."""
+    legs = [locate_stored(f"drop2_w123_T0{leg}.gz") for leg in range(1, 7)]
+    answer = run("suggest", "--td", "0.5", *legs)
+    assert "this is a switched run" in answer.stderr
