@@ -381,9 +381,10 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "To plan the longer window first, set --min-rigid to a value between the two lengths.",
         ),
         "rigid-times": Explanation(
-            "d2rpick found an interval in which the parts were rigid, and does not use it as a flight of a reference "
-            "run.",
-            "Use a reference run, or give the windows with --done.",
+            "This record is that of a switched run: parts were rigid in the stated interval, which d2rpick does not "
+            "use as a flight of a reference run. What the window froze also changes the vibration after it.",
+            "Choose times from the reference run. To plan the later windows of the switched run, use d2rpick plan "
+            "--done.",
         ),
     },
     "Many runs": {
