@@ -208,6 +208,8 @@ def print_card(
     from d2rpick.deck.printing import SOLVERS, find_solver, print_cards
 
     if run is None:
+        if request.deck:
+            _refuse_history_as_deck(request.deck)
         request.without_history()
         return JudgedCard(print_cards(windows, _complete_alone(request, cards)))
     from d2rpick.api.asked import ask_run  # Imported here to keep start-up fast.
@@ -219,6 +221,13 @@ def print_card(
     if parts and SOLVERS[solver].switches != "part":
         raise ArgumentError(_ONLY_JUDGED.format(SOLVERS[solver].title))
     return judge_and_print(question, cards, windows)
+
+
+def _refuse_history_as_deck(name: str) -> None:
+    """Raise DeckError if a file that was given as a deck is a history."""
+    from d2rpick.deck.source import SourceFile  # Imported here to keep start-up fast.
+
+    SourceFile(name).refuse_history()
 
 
 def _complete_alone(request: Request, cards: Cards) -> Printing:

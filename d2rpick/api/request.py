@@ -336,9 +336,9 @@ def read_channels(texts: Collection[str]) -> tuple[tuple[str, str], ...]:
     for quantity, name in pairs:
         if quantity not in QUANTITIES and name:
             near = suggest_name(quantity, tuple(QUANTITIES))
+            known = near or f", one of {', '.join(QUANTITIES)} was expected"
             raise ArgumentError(
-                f"`channels` {quantity}={name}: unknown quantity {quantity!r}{near}, one of {', '.join(QUANTITIES)} "
-                "was expected"
+                f"`channels` {quantity}={name}: unknown quantity {quantity!r}{known}"
             )
         if not name:
             raise ArgumentError(

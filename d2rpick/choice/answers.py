@@ -26,6 +26,7 @@ from d2rpick.choice.pair.decision import (
     CHECK_SWITCHED_RUN,
     CHOOSE_ANOTHER,
     GIVE_END_OF_LOAD,
+    GIVE_SWITCHED_RUN_OF_MODEL,
     Decision,
     decide,
 )
@@ -36,6 +37,7 @@ from d2rpick.choice.pair.quality import (
     Quality,
     list_exceeded_limits,
     rank_candidates,
+    trust_measured_momentum,
 )
 from d2rpick.choice.pair.situation import AnswerAtTd, Situation, examine_td
 from d2rpick.choice.pair.warnings import (
@@ -104,13 +106,15 @@ class PairVerdict(AnswerAtTd):
         decision = self._decide(None)
         if decision.grade == POOR:
             decision = self._decide(self.better)
-        if self._is_refuted:
+        if self._is_refuted or self.is_of_other_run:
             return decision
         return compare_in_flight(decision, self.situation, self.candidate)
 
     @property
     def _cure_of_objections(self) -> str:
         """Advice on a pair that is not admissible."""
+        if self.is_of_other_run:
+            return GIVE_SWITCHED_RUN_OF_MODEL
         if self._is_refuted:
             return CHECK_SWITCHED_RUN
         flight = self.situation.flight
@@ -137,7 +141,13 @@ class PairVerdict(AnswerAtTd):
         from d2rpick.choice.pair.cures import omit_comparison
 
         quality = omit_comparison(decision.quality)
-        return decision._replace(quality=quality, is_compared=True)
+        grade = decision.grade
+        is_momentum_equal = self.switched.momentum_error is not None
+        if is_momentum_equal and not self.switched.objections:
+            quality = trust_measured_momentum(quality)
+            is_refused = decision.objections or self.errors
+            grade = POOR if is_refused else quality.grade
+        return decision._replace(grade=grade, quality=quality, is_compared=True)
 
     @cached_property
     def _best_residual(self) -> float | None:
@@ -151,7 +161,7 @@ class PairVerdict(AnswerAtTd):
     @cached_property
     def better(self) -> Pair | None:
         """A better pair with a grade other than "poor": that of ``suggest`` for this td, or what it names as better."""
-        if self._is_refuted:
+        if self._is_refuted or self.is_of_other_run:
             return None
         good = self._good_pair
         if good is None or good.td != self.situation.td:
@@ -168,6 +178,11 @@ class PairVerdict(AnswerAtTd):
     def _good_pair(self) -> Pair | None:
         """The pair recommended from the reference run alone, even if a finished switched run is known."""
         return find_good_pair(self._suggestion)
+
+    @property
+    def is_of_other_run(self) -> bool:
+        """True if the switched run differs from the reference run although neither was rigid yet."""
+        return self.switched is not None and self.switched.is_of_other_run
 
     @property
     def _is_refuted(self) -> bool:

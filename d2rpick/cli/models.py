@@ -10,6 +10,7 @@ from d2rpick.api.models import HISTORIES, Box, Motion, Scanning, warn_if_unbalan
 from d2rpick.base.errors import ArgumentError, D2RPickError
 from d2rpick.base.options import list_options
 from d2rpick.cli import options
+from d2rpick.cli.missing import list_needs_of_motion
 from d2rpick.cli.options import FILES, RESULT
 from d2rpick.cli.progress import show_counting
 from d2rpick.report.formats import FORMATS, PLAIN, write
@@ -35,7 +36,7 @@ _ABSENT = (
 )
 
 
-@options.make_command
+@options.make_command_with_needs(list_needs_of_motion)
 @options.add_options(
     *list_options(Motion), of=[Motion],
     stiffness=_NEEDED, mass=_NEEDED, alpha={"default": 0.0}, t_end=_NEEDED, dt=_NEEDED,

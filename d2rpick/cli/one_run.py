@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -43,6 +43,8 @@ from d2rpick.cli.values import CARDS
 from d2rpick.report.formats import FORMATS, WrittenDeck, write
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
     from d2rpick.api.asked import RunQuestion
     from d2rpick.api.cards import Cards
     from d2rpick.api.judged_cards import JudgedCard
@@ -215,11 +217,15 @@ def _finish_answer(
     question: RunQuestion,
     decision: VerdictOnPair | None,
     min_quality: str,
+    introduction: str = "",
 ) -> None:
-    """Exit with code 1 if the verdict is below ``min_quality``, or if a given deck was not used."""
+    """Exit with code 1 if the verdict is below ``min_quality``, or if a given deck was not used.
+
+    The message on the verdict begins with the ``introduction``.
+    """
     if question.unused_deck:
         output.finish_without_deck(question.unused_deck)
-    output.finish_by_verdict(decision, min_quality)
+    output.finish_by_verdict(decision, min_quality, introduction)
 
 
 @options.make_command
@@ -290,7 +296,17 @@ def explore(
     _finish_answer(output, question, decision, question.settings.min_quality)
 
 
-@options.make_command
+def _list_needs_of_pair(values: Mapping[str, Any]) -> Iterable[str]:
+    """Yield the times that ``verify`` lacks."""
+    if values.get("switched"):
+        return
+    times = [name for name in ("tr", "td") if values.get(name) is None]
+    if times:
+        names = " and ".join(f"--{name} T" for name in times)
+        yield f"{names} (or --switched FILE, a finished switched run)"
+
+
+@options.make_command_with_needs(_list_needs_of_pair)
 @options.make_time_option(
     "--tr", "Switch to rigid at this time.  [default: read from the run of --switched]"
 )
@@ -356,7 +372,16 @@ def verify(
     )
     if answer.switched and answer.switched.objections:
         output.finish_with_failed_comparison()
-    _finish_answer(output, question, answer.decision, question.settings.min_quality)
+    introduction = (
+        "the comparison is within its limits, but " if answer.switched else ""
+    )
+    _finish_answer(
+        output,
+        question,
+        answer.decision,
+        question.settings.min_quality,
+        introduction,
+    )
 
 
 @options.make_command

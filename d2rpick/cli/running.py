@@ -10,6 +10,7 @@ import click
 from d2rpick.base.errors import make_printable
 from d2rpick.base.options import NOT_NEGATIVE, POSITIVE, Option
 from d2rpick.cli import options
+from d2rpick.cli.missing import list_needs_of_drive, list_needs_of_first
 from d2rpick.cli.output import Output, encode_text, name_options_and_wrap, tell
 from d2rpick.cli.progress import show_progress
 from d2rpick.cli.values import choose_click_type
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 CMD = ("program", "CMD")
 
 
-@options.make_command
+@options.make_command_with_needs(list_needs_of_drive)
 @click.argument("deck", type=choose_click_type("file"))
 @click.option(
     "-o", "folder", metavar="RUNDIR", required=True, type=choose_click_type("output"),
@@ -224,7 +225,7 @@ def follow(
     output.finish(objection=failed or is_on_ground)
 
 
-@options.make_command
+@options.make_command_with_needs(list_needs_of_first)
 @click.argument("deck", type=choose_click_type("file"))
 @options.make_click_option(
     "part",

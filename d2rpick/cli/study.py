@@ -23,7 +23,7 @@ from d2rpick.base.errors import (
 from d2rpick.base.options import UNLIMITED, Option
 from d2rpick.cli import options
 from d2rpick.cli.options import RESULT, WINDOW
-from d2rpick.cli.output import Output, tell
+from d2rpick.cli.output import Output, name_options, tell
 from d2rpick.cli.progress import show_counting
 from d2rpick.cli.values import choose_click_type
 from d2rpick.report.formats import FORMATS, RepeatedQuestion
@@ -145,7 +145,7 @@ def _finish_study(answer: Study, output: Output) -> None:
     """Exit with the code that the answer requires, after a message that explains the code."""
     if not answer.judged:
         tell(
-            f"d2rpick: no run could be judged; the first: {answer.runs[0].message or ''}"
+            f"d2rpick: no run could be judged; the first: {name_options(answer.runs[0].message or '')}"
         )
     if not answer.judged or any(row.status == INTERNAL_ERROR for row in answer.runs):
         click.get_current_context().exit(2)

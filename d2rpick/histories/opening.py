@@ -421,9 +421,45 @@ def _has_model_and_parts(legs: Sequence[Database]) -> bool:
 
 def _refuse_unknown_channels(databases: Sequence[Legs], selection: Selection) -> None:
     """Raise FormatError if no database has a channel that the user names for a quantity."""
+    with_channels = [database for database in databases if database.channels]
     for quantity, name in selection.channels:
-        if not any(quantity in database.quantities for database in databases):
-            databases[0].find(name)
+        if any(_has_channel(database, name) for database in with_channels):
+            continue
+        option = f"`channels` {quantity}={name}"
+        expected = "the name of a column was expected"
+        if quantity == "mass" and _is_number(name):
+            expected += ", not a value (`mass` takes that of the oscillator model)"
+        if not with_channels:
+            sources = ", ".join(database.source for database in databases)
+            raise FormatError(
+                f"{sources}: {option}: {expected}, and there are only columns of parts"
+            )
+        database = with_channels[0]
+        try:
+            database.find(name)
+        except FormatError as error:
+            problem = str(error).removeprefix(f"{database.source}: ")
+            raise FormatError(
+                f"{database.source}: {option}: {expected}; {problem}"
+            ) from None
+
+
+def _has_channel(database: Legs, name: str) -> bool:
+    """Return True if a name or number selects a channel of a database."""
+    try:
+        database.find(name)
+    except FormatError:
+        return False
+    return True
+
+
+def _is_number(text: str) -> bool:
+    """Return True if a text is a number."""
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
 
 
 def _refuse_time_of_solver(kinds: Sequence[str], time: str | None) -> None:

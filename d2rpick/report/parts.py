@@ -585,7 +585,7 @@ def list_page_remarks(answer: Parts) -> list[tuple[str, str]]:
         grows = f"may grow {much} while these parts are rigid"
         cures = (
             f"the cards limit it to 1/{CAP_SHARE} of the rigid time (--step-cap sets another limit); "
-            "to include its gain in the saving, give --step-ratio"
+            "to include the longer time step in the saving, give --step-ratio"
         )
         lines.append(("time step", f"{grows}; {cures}"))
     errors = [part_set.position_error for part_set in answer.sets]

@@ -287,7 +287,7 @@ def give_plan_sentence(plan: RunPlan) -> str:
     share = format_rigid_share(plan.rigid_fraction, plan.history)
     if _uses_only_poor_windows(plan):
         return f"{use}: rigid {spans}, {share}, is planned only because of `min_quality` poor"
-    text = f"{use}: make rigid {spans}, {share}"
+    text = f"{use}: make the parts rigid {spans}, {share}"
     if plan.run_time_share is not None:
         text += f"; saves {format_saved_share(plan.run_time_share)}"
     if not waiting:

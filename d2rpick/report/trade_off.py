@@ -109,7 +109,9 @@ def as_table(trade_off: TradeOff, display: DisplayOptions) -> str:
     ]
     hidden_count = len(trade_off.offers) - len(listed_offers)
     if hidden_count:
-        lines.append(f"... and {hidden_count} more td (--limit; csv and json have all)")
+        lines.append(
+            f"... and {hidden_count} more values of td (raise --limit, or use -f csv or -f json)"
+        )
     input_lines = [
         ("history", describe_input(trade_off.situation.history)),
         ("td", window),
@@ -358,6 +360,8 @@ def _describe_cost_change(start: Offer, step: Offer) -> str:
         return "costs no rigid time"
     if change < 0:
         return f"costs {-change:.1%} of the rigid time"
+    if change >= 1:
+        return f"makes the rigid time {change + 1:.3g} times as long"
     return f"makes the rigid time {change:.1%} longer"
 
 

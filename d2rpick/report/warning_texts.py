@@ -404,6 +404,11 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "The choice has a different basis in different runs, so their errors are not directly comparable.",
             "Compare the verdicts, or write the same output in all runs.",
         ),
+        "mixed-parts": Explanation(
+            "The runs were judged by the energies of different parts. The common tr then belongs to different switches "
+            "in different runs.",
+            "Name the same parts for all runs by their numbers with --part.",
+        ),
         "mixed-units": Explanation(
             "The runs have different time units, but td is a single value.",
             "Convert the runs to one unit, or study the runs of each unit separately.",

@@ -173,7 +173,7 @@ def _check_never_back(case: Case) -> Iterator[PlacedMessage]:
         times = [tr for event, tr in opened.items() if event.by is card]
         yield (
             field,
-            f"{unit_names} made rigid at {min(times):g} and never switched back in this deck",
+            f"{unit_names} made rigid at {min(times):g} and never made deformable again in this deck",
         )
 
 

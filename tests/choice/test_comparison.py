@@ -161,7 +161,7 @@ def test_the_times_are_read_off_the_switched_run() -> None:
         in read_refusal("verify", "--part", "box", "--switched", BOX, BOX)
     )
     assert (
-        "give --td too, or a finished switched run"
+        "missing: --td T (or --switched FILE, a finished switched run)"
         in run("verify", "--tr", "0.1", "--part", "box", BOX).stderr
     )
 

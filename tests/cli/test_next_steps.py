@@ -606,7 +606,7 @@ def test_verify_blames_a_wrong_tr_with_one_error() -> None:
 def test_verify_blames_td_if_tr_is_the_best_for_it() -> None:
     tr = run_json("suggest", "--td", "0.064", ENERGY)["recommended"]["tr"]
     reason = find_line("why", "verify", "--tr", str(tr), "--td", "0.064", ENERGY)
-    assert "kinetic at td, which no tr can keep" in reason
+    assert "kinetic at td, and no tr can keep kinetic energy" in reason
     assert "tr does not match" not in reason
 
 
@@ -858,7 +858,7 @@ def test_no_step_asks_for_an_end_of_the_load_that_the_momentum_denies(
         assert "no flight is found" in text or "no free flight is found" in text
     given = run("plan", "--after", "0.2", str(table))
     text = " ".join(given.stdout.split())
-    assert text.startswith("use with care: make rigid from ")
+    assert text.startswith("use with care: make the parts rigid from ")
     assert (
         " why the motion is good only if the parts fly as you stated with --after: the flight is used as given, "
         "although the momentum shows no free flight" in text

@@ -43,6 +43,10 @@ CHECK_SWITCHED_RUN: Final = (
     "check that the switched run was switched at these times and is otherwise identical to the reference run; "
     "if so, choose another td"
 )
+# GIVE_SWITCHED_RUN_OF_MODEL: advice if the switched run differs from the reference run before the switch.
+GIVE_SWITCHED_RUN_OF_MODEL: Final = (
+    "give the switched run of this model, with the same loads and velocities"
+)
 # _USE_BEST: advice if the best pair in the given range of td can be used with care.
 # _AVOID_BEST: advice if even the best pair in the given range of td cannot be used.
 _USE_BEST: Final = (
@@ -200,7 +204,7 @@ class Decision(NamedTuple):
             )
         if self.residual is not None:
             parts.append(
-                f"vibration wrong by {format_residual(self.residual)} (residual {self.residual:.3f})"
+                f"vibration error {format_residual(self.residual)} (residual {self.residual:.3f})"
             )
         return ", ".join(parts) or "unknown: no model of the vibration fits the record"
 
@@ -232,11 +236,11 @@ class Decision(NamedTuple):
         if self.at_rest:
             return "the same"
         if self.residual is None:
-            text = f"vibration wrong by {format_residual(self.worst_residual)}"
+            text = f"vibration error {format_residual(self.worst_residual)}"
             return f"{text}, if the deformation at tr is opposite to that at td"
         if self.worst_residual - self.residual <= _ALIKE:
             return "the same"
-        return f"vibration wrong by {format_residual(self.worst_residual)}"
+        return f"vibration error {format_residual(self.worst_residual)}"
 
     @property
     def cure(self) -> str:
@@ -345,7 +349,7 @@ def _explain_why_good(quality: Quality, residual: float | None) -> str:
         error = (
             "" if residual is None else f" with an error of {format_residual(residual)}"
         )
-        return f"the flight is certain, and the vibration after td is kept{error}"
+        return f"the flight is certain, and the vibration after td is reproduced{error}"
     return f"{'; '.join(quality.alone.reasons)}{_explain_raised_grade(quality)}"
 
 
@@ -383,4 +387,4 @@ def _describe_pair(pair: Pair, level: float | None) -> str:
         return f"{times}: the energy at td is {level:.3g} times as high, so more of the vibration can be kept"
     if pair.residual is None:
         return times
-    return f"{times}: vibration wrong by {format_residual(pair.residual)}"
+    return f"{times}: vibration error {format_residual(pair.residual)}"
