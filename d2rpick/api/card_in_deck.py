@@ -37,10 +37,10 @@ def warn_about_lead(
     if known_parts:
         names = list_names([part.name for part in known_parts], most=_MOST_NAMES)
         problem = f"`merge` {lead}: the history has no part {lead}, only {names}"
-    beside = " beside a `history`" if known_parts is None else ""
+    addition = " with a `history`" if known_parts is None else ""
     yield Caution(
         UNKNOWN_LEAD,
-        f"{problem}; give a part of the model as `merge`, or the main deck as `deck`{beside} to check the card",
+        f"{problem}; give a part of the model as `merge`, or the main deck as `deck`{addition} to check the card",
     )
 
 
