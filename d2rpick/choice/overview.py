@@ -27,8 +27,7 @@ from d2rpick.choice.health import (
     warn_about_health,
 )
 from d2rpick.choice.pair.grades import DO_NOT_USE, USE, USE_WITH_CARE
-from d2rpick.choice.pair.situation import FEWEST_STATES
-from d2rpick.choice.question import Reference, Settings
+from d2rpick.choice.question import FEWEST_STATES, Reference, Settings
 from d2rpick.choice.switched.frozen import find_frozen_times
 from d2rpick.choice.switched.switched_run import (
     find_rigid_times,
@@ -210,7 +209,7 @@ def _describe_flights(flights: Sequence[tuple[str, FreeFlight]]) -> str:
     """Describe the number of flights and the duration of the longest flight."""
     longest = max(flight.end - flight.start for _, flight in flights)
     count = f"{len(flights)} free flight{'s' * (len(flights) > 1)}"
-    return f"{count}, the longest for {longest:.6g}"
+    return f"{count}; the longest lasts {longest:.6g}"
 
 
 def _describe_health(health: Health | None) -> str:

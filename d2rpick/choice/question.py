@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.choice.options import ChoiceOptions
 from d2rpick.choice.pair.grades import FAIR
 from d2rpick.histories.names import Selection
 from d2rpick.histories.opening import open_run
-from d2rpick.vibration.measures import run_time_share
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -22,6 +21,8 @@ if TYPE_CHECKING:
     from d2rpick.histories.run import OpenedRun
     from d2rpick.vibration.modes import Mode
 
+# Smallest number of states from which times can be chosen.
+FEWEST_STATES: Final = 3
 _DEFAULT = Selection()
 
 
@@ -88,6 +89,9 @@ class Settings(ChoiceOptions):
 
     def run_time_share(self, rigid_fraction: float) -> float | None:
         """Return the expected run time relative to the reference run [-]; None if the cost fraction is unknown."""
+        # Imported here to keep start-up fast.
+        from d2rpick.vibration.measures import run_time_share
+
         share = self.cost_share
         if share is None:
             return None

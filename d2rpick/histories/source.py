@@ -234,8 +234,8 @@ def _list_databases(folder: Path) -> list[str]:
         )
     runs = sorted({*databases.values()})
     if len(runs) > 1:
-        problem = f"{folder}: this folder holds several runs ({list_names(runs, most=5)}), one was expected"
-        raise FormatError(f"{problem}; name the files of one")
+        problem = f"{folder}: this folder contains several runs ({list_names(runs, most=5)}), one was expected"
+        raise FormatError(f"{problem}; give the files of one run")
     return [str(file) for file in databases]
 
 

@@ -121,9 +121,7 @@ def name_step_to_card(
     is_radioss = SOLVERS[find_solver(history.format)].switches == "node"
     is_chosen = question.parts or "--energy" in question.options
     if flying and not is_chosen and not is_radioss:
-        again = "verify" if command == "card" else command
-        line = write_command(question, again, *question.times, new_parts=[_FLYING])
-        return f"choose the parts to switch, for example those that fly, with {line}"
+        return name_step_to_parts(question, "verify" if command == "card" else command)
     # Only `card` accepts parts that the history does not contain.
     if command != "card" and (history.parts or is_radioss):
         words = (*question.times, "-f", "card")
@@ -157,6 +155,12 @@ def name_step_to_card(
     else:
         line = write_command(question, command, *words)
     return f"print the cards with {line}{hint}"
+
+
+def name_step_to_parts(question: RepeatedQuestion, command: str) -> str:
+    """Return the step that repeats a ``command`` with the parts that fly instead of the whole model."""
+    line = write_command(question, command, *question.times, new_parts=[_FLYING])
+    return f"choose the parts to switch, for example those that fly, with {line}"
 
 
 def _name_bodies(
@@ -226,7 +230,9 @@ def _name_step_to_better_record(
         line = write_command(_allow_deck(question), "suggest", *words)
         without = _ADD_COLUMNS if history.format in ("csv", "hdf5") else ""
         return f"judge the run with its deck: {line}{deck.hint}{without}"
-    return f"improve the record: {decision.cure}; no pair of it can be used before"
+    return (
+        f"improve the record: {decision.cure}; until then, no pair from it can be used"
+    )
 
 
 def add_step_to_copy(
@@ -474,4 +480,4 @@ def name_step_after_first(folder: str) -> str:
     files = make_positional([folder])
     check = quote_shell_line(("d2rpick", "check", *files))
     follow = quote_shell_line(("d2rpick", "follow", *files))
-    return f"check the deck with {check}, and run it; {follow} shows meanwhile when the parts fly and are rigid"
+    return f"check the deck with {check}, and run it; meanwhile, {follow} shows when the parts fly or are rigid"

@@ -438,7 +438,7 @@ def test_a_tr_that_is_not_known_to_its_tolerance_is_fair() -> None:
     worst = [
         float(
             re.findall(
-                r"At worst: vibration\s+wrong by ([\d.]+)%",
+                r"At worst: vibration\s+error ([\d.]+)%",
                 as_table(answer_of_td, DisplayOptions()),
             )[0]
         )

@@ -60,7 +60,7 @@ def test_parts_without_a_deck_are_unknown_and_the_deck_is_the_cure() -> None:
 def test_a_run_without_an_energy_balance_has_an_unknown_health() -> None:
     text = join_lines(run("info", MATSUM).stdout)
     assert text.startswith(
-        "record can be used to choose times: it has flights, and d2rpick plan judges their windows "
+        "record can be used to choose times: it has flights, and d2rpick plan judges the windows in them "
         "why 1 free flight"
     )
     assert "the health of the run is unknown" in text
@@ -206,7 +206,7 @@ def test_a_window_of_a_cut_file_is_that_of_the_part_that_was_read(
 ) -> None:
     cut = cut_file(tmp_path, SAMPLES / "energy.glstat", 100_000)
     plan = join_lines(run("plan", cut).stdout)
-    assert plan.startswith("use: make rigid from ")
+    assert plan.startswith("use: make the parts rigid from ")
     share, rest = plan.split("of the record that was read", 1)
     assert share.endswith("92% ")
     assert "note the record ends early, at 0.0316, within a state: " in rest

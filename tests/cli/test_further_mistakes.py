@@ -54,8 +54,8 @@ SWITCHING = str(ROOT / "sample_data" / "switching.k")
         (
             ("replay", "--mass", "1", "--beta", "1"),
             (
-                "missing: --stiffness NUMBER (spring stiffness k); --t-end T (last time); --dt T (output interval); "
-                "--v0 NUMBER, or some of"
+                "missing: --stiffness NUMBER (spring stiffness k); --t-end T (end of the computed run); "
+                "--dt T (output interval); --v0 NUMBER, or some of"
             ),
         ),
         (
@@ -229,8 +229,8 @@ def test_no_flight_is_assumed_across_a_missing_restart_segment() -> None:
     legs = [locate_stored(f"rollover_r100_T0{leg}.gz") for leg in (1, 3)]
     first_screen = " ".join(run("info", *legs).stdout.split())
     assert first_screen.startswith(
-        "record can be used with care to choose times: it has flights, and d2rpick plan judges their windows why there "
-        "are no states from 0.0999564 to 0.370008: a restart segment may be missing, and no flight is assumed"
+        "record can be used with care to choose times: it has flights, and d2rpick plan judges the windows in them "
+        "why there are no states from 0.0999564 to 0.370008: a restart segment may be missing, and no flight is assumed"
     )
     flights = run_json("info", *legs)["flights"]
     assert [flight["start"] > 0.37 for flight in flights] == [True]
@@ -263,8 +263,8 @@ def test_verify_names_the_best_pair_for_the_given_td_too() -> None:
         run("verify", "--tr", "0.03", "--td", "0.12", ENERGY).stdout.split()
     )
     assert (
-        "to improve use tr = 0.0128534, td = 0.119046: vibration wrong by 0.0%, rigid for 0.106193; with the given "
-        "td, tr = 0.0128455, td = 0.12: vibration wrong by 23%, rigid for 0.107155 expect"
+        "to improve use tr = 0.0128534, td = 0.119046: vibration error 0.0%, rigid for 0.106193; with the given "
+        "td, tr = 0.0128455, td = 0.12: vibration error 23%, rigid for 0.107155 expect"
     ) in answer
 
 
@@ -283,9 +283,9 @@ def test_verify_names_the_best_pair_of_the_flight_beside_the_nearest(
     answer = run("verify", "--tr", "0.05", "--td", "0.12", str(table)).stdout
     cure = " ".join(answer.split()).partition("to improve use ")[2]
     nearest, best = cure.partition(" expect ")[0].split("; best in the flight, ")
-    assert nearest.startswith("tr = 0.0307804, td = 0.1135: vibration wrong by 38%")
+    assert nearest.startswith("tr = 0.0307804, td = 0.1135: vibration error 38%")
     assert (
-        best == "tr = 0.0725888, td = 0.3: vibration wrong by 20%, rigid for 0.227411"
+        best == "tr = 0.0725888, td = 0.3: vibration error 20%, rigid for 0.227411"
     )
 
 

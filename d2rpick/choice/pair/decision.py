@@ -207,7 +207,7 @@ class Decision(NamedTuple):
             )
         if self.residual is not None:
             parts.append(
-                f"vibration wrong by {format_residual(self.residual)} (residual {self.residual:.3f})"
+                f"vibration error {format_residual(self.residual)} (residual {self.residual:.3f})"
             )
         return ", ".join(parts) or "unknown: no model of the vibration fits the record"
 
@@ -239,11 +239,11 @@ class Decision(NamedTuple):
         if self.at_rest:
             return "the same"
         if self.residual is None:
-            text = f"vibration wrong by {format_residual(self.worst_residual)}"
+            text = f"vibration error {format_residual(self.worst_residual)}"
             return f"{text}, if the deformation at tr is opposite to that at td"
         if self.worst_residual - self.residual <= _ALIKE:
             return "the same"
-        return f"vibration wrong by {format_residual(self.worst_residual)}"
+        return f"vibration error {format_residual(self.worst_residual)}"
 
     @property
     def cure(self) -> str:
@@ -360,7 +360,7 @@ def _explain_why_good(quality: Quality, residual: float | None) -> str:
         error = (
             "" if residual is None else f" with an error of {format_residual(residual)}"
         )
-        return f"the flight is certain, and the vibration after td is kept{error}"
+        return f"the flight is certain, and the vibration after td is reproduced{error}"
     return f"{'; '.join(quality.alone.reasons)}{_explain_raised_grade(quality)}"
 
 
@@ -398,4 +398,4 @@ def _describe_pair(pair: Pair, level: float | None) -> str:
         return f"{times}: the energy at td is {level:.3g} times as high, so more of the vibration can be kept"
     if pair.residual is None:
         return times
-    return f"{times}: vibration wrong by {format_residual(pair.residual)}"
+    return f"{times}: vibration error {format_residual(pair.residual)}"

@@ -658,10 +658,10 @@ def _describe_wrong_vibration(situation: Situation, residual: float) -> Cause:
             kind=f"{_WRONG_BY_MORE} {POOR_RESIDUAL:.0%}",
         )
     return Cause(
-        f"{reason}, since {share:.0%} of its energy is kinetic at td, which no tr can keep",
+        f"{reason}, since {share:.0%} of its energy is kinetic at td, and no tr can keep kinetic energy",
         "use d2rpick explore to see whether another td is better",
         needs_other_times=True,
-        kind="most of the vibration energy is kinetic at td, which no tr can keep",
+        kind="most of the vibration energy is kinetic at td, and no tr can keep kinetic energy",
     )
 
 
