@@ -314,6 +314,11 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "Parts of the history are missing from the deck, so their costs and connections are unknown.",
             "Give the deck of this run, with all its include files.",
         ),
+        "lead-part-unknown": Explanation(
+            "The card merges the parts into a lead part that the history does not contain. LS-DYNA stops with an error "
+            "if the model has no such part.",
+            "Give the deck with --deck, so that d2rpick checks the card, or give a part of the model with --merge.",
+        ),
         "parts-not-joined": Explanation(
             "The card makes several parts rigid, each as a separate rigid body. If they share nodes, they must form "
             "one rigid body.",

@@ -307,3 +307,24 @@ def test_a_flight_after_a_rigid_window_belongs_to_a_switched_run() -> None:
     legs = [locate_stored(f"drop2_w123_T0{leg}.gz") for leg in range(1, 7)]
     answer = run("suggest", "--td", "0.5", *legs)
     assert "this is a switched run" in answer.stderr
+
+
+@pytest.mark.parametrize(
+    ("question", "problem"),
+    [
+        (
+            ("card", "--tr", "0.1", "--td", "0.2", "--part", "1"),
+            "nothing shows that the model has a part 7; give a part of the model as --merge, or the main deck as",
+        ),
+        (
+            ("plan", "--part", "flying", "-f", "card", MATSUM),
+            "the history has no part 7, only box, step; give a part of the model as --merge, or the main deck",
+        ),
+    ],
+)
+def test_a_lead_part_that_nothing_shows_is_a_warning(
+    question: tuple[str, ...], problem: str
+) -> None:
+    answer = run(*question, "--merge", "7")
+    assert f"warning: lead-part-unknown: --merge 7: {problem}" in answer.stderr
+    assert "lead-part-unknown" not in run(*question, "--merge", "1").stderr
