@@ -200,10 +200,13 @@ def test_a_mistyped_run_to_follow_is_compared_with_its_neighbours(
 ) -> None:
     (tmp_path / "run_a").mkdir()
     answer = run("follow", "--once", str(tmp_path / "run_b"))
-    assert answer.exit_code == 1
+    assert answer.exit_code == 2
     assert "(did you mean 'run_a'?)" in answer.stdout
-    assert "exit code 1: the parts do not fly" in answer.stderr
-    assert "did you mean" not in run("follow", "--once", str(tmp_path / "run_a")).stdout
+    assert "exit code 2: there is no such file or folder" in answer.stderr
+    waiting = run("follow", "--once", str(tmp_path / "run_a"))
+    assert waiting.exit_code == 1
+    assert "exit code 1: the parts do not fly" in waiting.stderr
+    assert "did you mean" not in waiting.stdout
 
 
 def test_a_main_node_that_the_deck_lacks_is_refused_with_those_it_has() -> None:
