@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 )
 @options.add_options(
     *("part", *CARDS, "deck", "no_deck", *REFERENCE, *FILES, "exit_zero"),
-    deck="Main deck of the run of --history, which defines the parts that become one rigid body.",
+    deck="Main deck that belongs to --history; it defines which parts become one rigid body.",
     part={
         "help": "Parts to switch, by number (3,7) or range (10-19), or with --history by title.",
         "type": choose_click_type("names"),

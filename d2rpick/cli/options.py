@@ -455,7 +455,7 @@ _FLAGS: Final = [
         ),
         (
             ["-v", "--verbose"],
-            "Print all details, and on stderr what was read and how long reading took.",
+            "Print all details; print the files that were read, and the time that reading took, to stderr.",
         ),
     )
 ]

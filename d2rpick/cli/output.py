@@ -96,7 +96,7 @@ class Output:
     )
     overwrite: bool = make_option("Replace existing files.", "flag", default=False)
     quiet: bool = make_option(
-        "Print no notes and warnings to stderr.", "flag", default=False, short=("-q",)
+        "Print no notes or warnings to stderr.", "flag", default=False, short=("-q",)
     )
     limit: int = make_option(
         "Number of rows in the table; json and csv contain all.",

@@ -95,9 +95,9 @@ def drive(
     r"""Compute a Radioss run that needs no reference run, because d2rpick switches the parts as the run proceeds.
 
     DECK, a starter deck with one engine file, is copied into RUNDIR.  The parts are treated as flying when no force has
-    acted on them for the time --wait.  A rigid probe run then finds the next contact.  From one margin before this
-    contact, the run continues with deformable parts.  The result is reproducible: the same command gives the same run.
-    --resume continues an interrupted run.
+    acted on them for the time --wait.  A rigid probe run then finds the next contact.  The run then continues with
+    deformable parts from a time that is one margin before this contact.  The result is reproducible: the same command
+    gives the same run.  --resume continues an interrupted run.
 
     Examples
     --------
@@ -168,7 +168,7 @@ def _plan(driving: Driving) -> list[str]:
     is_flag=True,
     cls=options.Either,
     instead_of=("lasting",),
-    help="Report the present state, and end.",
+    help="Report the present state, and exit.",
 )
 @click.option(
     "--for", "lasting", type=choose_click_type(NOT_NEGATIVE), metavar="T", cls=options.Either, instead_of=("once",),
@@ -187,7 +187,7 @@ def follow(
     request: Request,
     output: Output,
 ) -> None:
-    """Watch RUN, files or a folder, while it is computed: report when the parts fly, and when to switch.
+    """Watch RUN (files or a folder) while the solver computes it, and report when the parts fly and when to switch.
 
     d2rpick prints a line for each event: load, flight with its evidence, recommended switch, contact, restart, silence,
     end.  RUN need not have started.  d2rpick does not start, stop or change anything.
