@@ -32,7 +32,10 @@ def refuse(*arguments: str) -> str:
         (("--part", "1", "info", ENERGY), "No such option '--part' before the command; give the options of a command"),
         (("card", MATSUM), "takes options only; give a history as --history"),
         (("follow", MATSUM, ENERGY), "d2rpick follow takes one RUN; if these are files of one run, give their folder"),
-        (("drive", "a.rad", "b.rad", "-o", "new", *PROGRAMS), "b.rad: unexpected, because d2rpick drive takes one DECK; leave it out, or"),
+        (
+            ("drive", "a.rad", "b.rad", "-o", "new", *PROGRAMS),
+            "b.rad: unexpected, because d2rpick drive takes one DECK; leave it out, or",
+        ),
         (("follow", "--for", "5s", MATSUM), "'5s' is not a number: give the seconds as a number, 5"),
         (("drive", str(PLATE), "-o", "new", "--threads", "0"), "0 was found, a whole number of at least 1"),
         (("drive", str(PLATE), "-o", "new", "--part", "all", *PROGRAMS), "give the ids of parts in the deck"),
