@@ -93,7 +93,7 @@ class ReadingOptions:
         "Time column, by name, number or HDF5 path.", metavar="NAME|NUMBER"
     )
     energy: tuple[str, ...] = make_option(
-        "Energy column, label or HDF5 path; repeat the option to add several.",
+        "Energy column, label or HDF5 path; repeat the option to sum several energies.",
         *("channels", "NAME|NUMBER"), many=True, instead_of=("part",),
     )  # fmt: skip
     part: tuple[str, ...] = make_option(

@@ -256,8 +256,8 @@ def _choose_farm(
 def calibrate(folders: tuple[str, ...], output: Output) -> None:
     """Fit the cost of elements to the CPU times of your runs, for --weights.
 
-    Each RUN is the folder of one run, with its deck and the listings of its solver: NAME_0001.out with /MON/ON of
-    Radioss, d3hsp or glstat of LS-DYNA.  Give runs of the same model with and without switching.  If the runs
+    Each RUN is the folder of one run, with its deck and the listings of its solver: NAME_0001.out for Radioss (run with
+    /MON/ON), or d3hsp or glstat for LS-DYNA.  Give runs of the same model with and without switching.  If the runs
     cannot distinguish the costs of two formulations, their built-in ratio is kept.  A run that is named twice is used
     once.
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeAlias, TypeVar
 import numpy as np
 
 from d2rpick.base.caching import cached_property
-from d2rpick.base.errors import HistoryError, RangeError
+from d2rpick.base.errors import HistoryError, RangeError, list_names
 from d2rpick.base.memory import Memory, remember
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.histories.digits import format_distinctly
@@ -34,6 +34,8 @@ LARGEST_ENERGY: Final = 1e150
 _STILL: Final = 1e-6
 # Number of times at which the energy is interpolated in one step; it is small to keep the work arrays small.
 _TOGETHER: Final = 1 << 14
+# Largest number of parts that the name of an energy lists.
+_MOST_NAMED: Final = 5
 
 
 class Precision(NamedTuple):
@@ -342,6 +344,14 @@ class History:
             )
         object.__setattr__(self, "time", time)
         object.__setattr__(self, "energy", energy)
+
+    @property
+    def energy_name(self) -> str:
+        """Name of the energy; if it belongs to many parts, only the first of them are named."""
+        parts = [part.name for part in self.parts or () if part not in self.springs]
+        if len(parts) <= _MOST_NAMED:
+            return self.channel
+        return f"internal energy of {list_names(parts, most=_MOST_NAMED)}"
 
     @property
     def momenta(self) -> tuple[Momenta, ...]:

@@ -121,9 +121,7 @@ def name_step_to_card(
     is_radioss = SOLVERS[find_solver(history.format)].switches == "node"
     is_chosen = question.parts or "--energy" in question.options
     if flying and not is_chosen and not is_radioss:
-        again = "verify" if command == "card" else command
-        line = write_command(question, again, *question.times, new_parts=[_FLYING])
-        return f"choose the parts to switch, for example those that fly, with {line}"
+        return name_step_to_parts(question, "verify" if command == "card" else command)
     # Only `card` accepts parts that the history does not contain.
     if command != "card" and (history.parts or is_radioss):
         words = (*question.times, "-f", "card")
@@ -157,6 +155,12 @@ def name_step_to_card(
     else:
         line = write_command(question, command, *words)
     return f"print the cards with {line}{hint}"
+
+
+def name_step_to_parts(question: RepeatedQuestion, command: str) -> str:
+    """Return the step that repeats a ``command`` with the parts that fly instead of the whole model."""
+    line = write_command(question, command, *question.times, new_parts=[_FLYING])
+    return f"choose the parts to switch, for example those that fly, with {line}"
 
 
 def _name_bodies(

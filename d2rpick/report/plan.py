@@ -108,7 +108,7 @@ WINDOW: Final = row(
     Field(
         "certain",
         "flag",
-        "true if the evidence for the flight excludes contacts and loads",
+        "true if the evidence for the flight rules out contacts and loads",
         lambda row: row.flight.certain,
     ),
     Field(
@@ -173,7 +173,8 @@ WINDOW: Final = row(
     Field(
         "margin_source",
         maybe(one_of("given", "flight", "landing", "grazing", "no-contact")),
-        "source of the margin: given, 3 % of the flight, the shift that a switch may cause, or a grazing contact",
+        "source of the margin: --margin (given), 3 % of the flight (flight), the shift that a switch may cause "
+        "(landing), a grazing contact (grazing); no-contact if there is no next contact, and therefore no margin",
         _make_margin_getter("source"),
     ),
     Field(

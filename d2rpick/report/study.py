@@ -7,9 +7,11 @@ from collections import Counter
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, Final
 
+from d2rpick.base.errors import list_names, make_printable
 from d2rpick.choice.pair.grades import GOOD, GRADES, POOR, VERDICTS
 from d2rpick.choice.pair.quality import grade_residual
 from d2rpick.choice.runs.study import (
+    NAMED,
     OK,
     Spread,
     StudyOfRuns,
@@ -32,7 +34,7 @@ from d2rpick.report.fields import (
     write_csv,
 )
 from d2rpick.report.formats import RepeatedQuestion
-from d2rpick.report.next_step import write_command
+from d2rpick.report.next_step import name_step_to_parts, write_command
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -75,6 +77,11 @@ PLAIN: Final = row(
     Field("cure", "text?", "how to improve the pair; empty for a good pair", later=True),
     Field("better_td", "number?", "td of a better pair; null if none is known", later=True),
     Field("energy_unit", "text", "unit of the energies; empty if no file contains it", later=True),
+    Field("energy", "text?", "name of the energy by which the run was judged; it lists at most 5 parts", later=True),
+    Field("parts", maybe(many("integer")), "numbers of the parts whose energies were added; null for the whole model, "
+                                           "or for columns", later=True),
+    Field("is_unchosen", "flag?", "true if this is the energy of the whole model because no part or energy was chosen, "
+                                  "although the files show which parts fly", later=True),
 )  # fmt: skip
 _ERROR: Final = Field(
     "common_error", "number?",
@@ -100,9 +107,9 @@ _SHARED: Final = row(
           lambda answer: answer.spread or dict.fromkeys(_EXTENTS)),
     Field("agree", "flag?", "true if the intervals from tr_low to tr_high of these runs overlap"),
     Field("common_tr", "number?",
-          "median of tr, or the time nearest to it within all intervals, if the runs agree. Otherwise the earliest tr "
-          "that is admissible in every run with status ok or none, and within the timing tolerance of each, if there "
-          "is such a tr", lambda answer: answer.common.tr),
+          "if the runs agree, the median of tr, or the nearest time that lies in all intervals; otherwise the "
+          "earliest tr that is admissible in every run with status ok or none, and within the timing tolerance of "
+          "each of them; null if there is none", lambda answer: answer.common.tr),
     Field("common_verdict", maybe(keys.VERDICT),
           "what to do with common_tr: the verdict for the worst run, from its own pair and from its error at "
           "common_tr",
@@ -285,9 +292,29 @@ def list_outcome(answer: StudyOfRuns) -> list[tuple[str, str]]:
         (heading, shared),
         ("each run", _count_verdicts(answer)),
         *_list_repetitions(answer),
+        *_list_judged_energies(answer),
         ("td", describe_td(answer)),
         ("own tr", own_tr),
     ]
+
+
+def _list_judged_energies(answer: StudyOfRuns) -> list[tuple[str, str]]:
+    """Return a line with the energies by which the runs were judged, and the number of runs if they differ."""
+    descriptions = [_describe_energy(row) for row in answer.runs if row.energy]
+    if not descriptions:
+        return []
+    # Formats name the same energy with spaces or underscores.
+    counts = Counter(text.replace("_", " ") for text in descriptions)
+    if len(counts) == 1:
+        return [("judged", descriptions[0])]
+    texts = [f"{text} in {format_number_of_runs(n)}" for text, n in counts.items()]
+    return [("judged", list_names(texts, most=NAMED, between="; "))]
+
+
+def _describe_energy(row: StudyRow) -> str:
+    """Return the name of the energy by which a run was judged; if nothing was chosen, say how to choose parts."""
+    energy = make_printable(row.energy or "")
+    return f"{energy}, not that of chosen parts (--part)" if row.is_unchosen else energy
 
 
 def _describe_spread(spread: Spread, *, overlaps: bool) -> str:
@@ -384,6 +411,7 @@ def list_next_step(
 ) -> list[tuple[str, str]]:
     """Return the next command: to one td for all runs, to the verdict on the common pair, or to the worst run.
 
+    If the energy of the whole model was judged although the files show which parts fly, the parts are chosen first.
     If every run has a usable pair but no tr is common to all of them, each run can have its own tr and td. The td of
     one run is not offered to the others, because their pairs there were not judged and may be unusable.
     """
@@ -391,6 +419,8 @@ def list_next_step(
     if not judged:
         first = RepeatedQuestion(files=question.files[:1])
         return [("next", f"look at the first run with {write_command(first, 'info')}")]
+    if any(row.is_unchosen for row in judged):
+        return [("next", name_step_to_parts(question, "study"))]
     worst = min(judged, key=lambda row: GRADES.index(row.quality or POOR))
     of_worst = question._replace(files=(worst.source,))
     better_td = _find_shared_better_td(answer)

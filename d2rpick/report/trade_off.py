@@ -309,12 +309,13 @@ DOCUMENT: Final = Document("d2rpick/explore/2", "Answer of d2rpick explore; time
     Field("answer", "text", "summary of the answer in one sentence", give_answer),
     Field("recommended", maybe(keys.TIMES), "recommended pair; null if there is none"),
     Field("start", "number?",
-          "td with which the others are compared: the given td, otherwise the td with the largest saving",
+          "td with which the other values are compared: the given td or, if none is given, the td with the largest "
+          "saving",
           lambda trade_off: trade_off.start and trade_off.start.td),
     Field("step", "number?",
-          "nearest energy peak with at most half of the error at start and at least half of its rigid time, or nearest "
-          "Pareto-optimal td with these properties if no peak has them. If there is neither, the recommended td, if "
-          "its error is smaller than at start",
+          "td to which the answer points: the nearest energy peak with at most half of the error at start and at "
+          "least half of the rigid time at start; if there is no such peak, the nearest Pareto-optimal td with these "
+          "properties; otherwise the recommended td, if its error is smaller than the error at start; else null",
           lambda trade_off: trade_off.step and trade_off.step.td),
     Field("offers", many(OFFER),
           "evenly spaced values of td, the peaks of the energy, the given td and the recommended td, by ascending td"),

@@ -43,7 +43,8 @@ MEASURES: Final = row(
     Field(
         "td_ok",
         "flag?",
-        "true if td lies in the flight, and the kinetic fraction K is small enough; null if K is unknown",
+        "true if td lies in the flight and the kinetic fraction K does not exceed its limit (0.5, or "
+        "--max-kinetic-share); null if K is unknown",
     ),
     Field(
         "verified",
@@ -67,8 +68,8 @@ SWITCHED: Final = row(
     Field("momentum_error", "size?",
           "largest deviation of the momentum after td, relative to the largest momentum of the reference run after td"),
     Field("displacement", "size?", "largest distance between the centres of the parts in the two runs after td"),
-    Field("rigid_from", "number?", "first time at which the energy of the switched run is constant in the window; null "
-                                   "if it is not constant"),
+    Field("rigid_from", "number?", "time from which the energy of the switched run is constant in the window; null if "
+                                   "it is not constant"),
     Field("rigid_to", "number?", "last time at which this energy is constant"),
     Field("objections", "texts", "reasons why the comparison failed; empty if it passed"),
     Field("notes", "texts", "what was left out or assumed when the switched run was read, and anomalies of this run"),

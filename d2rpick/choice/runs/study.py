@@ -21,6 +21,7 @@ from d2rpick.base.errors import (
     RangeError,
     format_in_one_line,
     list_names,
+    name_units,
 )
 from d2rpick.choice.answers import decide_with_better_pair, suggest_in_run
 from d2rpick.choice.pair.grades import GRADES, POOR
@@ -46,7 +47,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.answers import PairSuggestion
     from d2rpick.choice.pair.decision import Decision
     from d2rpick.choice.question import Settings
-    from d2rpick.histories.history import Samples
+    from d2rpick.histories.history import History, Samples
 
 # Status of a run; only runs with one of the first two values were judged.
 OK, NONE, UNREADABLE, OUT_OF_RANGE, FAILED = (
@@ -106,7 +107,10 @@ class StudyRow:
     of the suggestion for this run. ``td`` is that of this run, and ``better_td`` that of a better pair. ``acceptable``
     contains the windows of acceptable tr, shape (n, 2), and ``alike`` the windows in which the error exceeds that of
     the run's own tr by at most 0.05. ``profile`` contains the errors, shape (2, m). ``files`` were read up to
-    ``record_end`` [time]. ``curve`` is an outline of the energy, shape (2, k), if it was requested.
+    ``record_end`` [time]. ``curve`` is an outline of the energy, shape (2, k), if it was requested. ``energy`` is the
+    name of the energy by which the run was judged. ``parts`` contains the ids of the parts to which it belongs; None
+    for the whole model or a column. ``is_unchosen`` is True if it is the energy of the whole model because no part or
+    energy was chosen, although the files show which parts fly.
     """
 
     source: str
@@ -128,6 +132,9 @@ class StudyRow:
     verdict_reason: str | None = None
     cure: str | None = None
     better_td: float | None = None
+    energy: str | None = None
+    parts: tuple[int, ...] | None = None
+    is_unchosen: bool | None = None
     acceptable: Samples = field(default_factory=lambda: np.zeros((0, 2)))
     alike: Samples = field(default_factory=lambda: np.zeros((0, 2)))
     profile: Samples | None = None
@@ -247,7 +254,15 @@ def judge_run(question: Question, source: str) -> StudyRow:
     time = reference.history.time
     energy = reference.history.energy
     curve = draw_outline(time, energy, _STRETCHES) if question.curve else None
-    return replace(make_row(source, answer), files=files, curve=curve, record_end=end)
+    is_chosen = bool(question.selection.energy or question.selection.parts)
+    shows_parts = answer.situation.flight.by_parts
+    return replace(
+        make_row(source, answer),
+        files=files,
+        curve=curve,
+        record_end=end,
+        is_unchosen=shows_parts and not is_chosen,
+    )
 
 
 def make_row(source: str, answer: PairSuggestion) -> StudyRow:
@@ -273,6 +288,8 @@ def make_row(source: str, answer: PairSuggestion) -> StudyRow:
         warnings=tuple(code for code in messages if code not in _NOT_REPEATED),
         time_unit=situation.history.time_unit,
         energy_unit=situation.history.energy_unit,
+        energy=situation.history.energy_name,
+        parts=_list_part_ids(situation.history),
         td=situation.td,
         acceptable=acceptable,
         alike=alike,
@@ -289,6 +306,13 @@ def make_row(source: str, answer: PairSuggestion) -> StudyRow:
         residual=best.residual,
         **_list_decision_fields(_decide(answer)),
     )
+
+
+def _list_part_ids(history: History) -> tuple[int, ...] | None:
+    """Return the ids of the parts to which an energy belongs, without the springs; None for the whole model."""
+    if history.parts is None:
+        return None
+    return tuple(part.id for part in history.parts if part not in history.springs)
 
 
 def _decide(answer: PairSuggestion) -> Decision | None:
@@ -423,6 +447,11 @@ def _warn_about_runs(rows: Sequence[StudyRow], common: Common) -> Iterator[Cauti
         "the basis of the choice differs between the runs",
         [row.basis for row in judged],
     )
+    yield from _warn_about_difference(
+        "mixed-parts",
+        "the runs were judged by the energies of different parts, so the common tr belongs to different switches",
+        [_name_parts(row) for row in judged],
+    )
     for code in dict.fromkeys(code for row in judged for code in row.warnings):
         sources = [row.source for row in judged if code in row.warnings]
         yield Caution(
@@ -461,6 +490,11 @@ def _warn_about_unusual_files(rows: Sequence[StudyRow]) -> Iterator[Caution]:
             "cut-runs",
             f"{count} were cut, or end earlier than most: {list_names(cut, most=NAMED)}",
         )
+
+
+def _name_parts(row: StudyRow) -> str:
+    """Return the parts by whose energy a run was judged, in words."""
+    return "the whole model" if row.parts is None else name_units(row.parts)
 
 
 def _warn_about_difference(
