@@ -9,7 +9,6 @@ from d2rpick.base.errors import Caution, DeckError
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from d2rpick.api.asked import RunQuestion
     from d2rpick.deck.printed_card import PrintedCard
 
 OBJECTION: Final = "card-objection"
@@ -18,13 +17,13 @@ UNJOINED: Final = "parts-not-joined"
 
 
 def collect_objections(
-    card: PrintedCard, question: RunQuestion, parts: int
+    card: PrintedCard, deck: str | None, parts: int
 ) -> Iterator[Caution]:
     """Yield the findings of ``check`` for the deck with the card or, without a deck, a warning about shared nodes.
 
     ``parts`` is the number of parts that the card switches by their ids.
     """
-    if question.deck is None:
+    if deck is None:
         if parts > 1:
             message = "without a deck of the run it is unknown whether these parts share nodes"
             yield Caution(
@@ -40,7 +39,7 @@ def collect_objections(
 
     with TemporaryDirectory() as folder:
         try:
-            checked = check_deck(write_deck(question.deck, card, folder)[0])
+            checked = check_deck(write_deck(deck, card, folder)[0])
         except DeckError as error:
             yield Caution(
                 ERROR_OF_CARD, f"the card does not fit into the deck: {error}"
