@@ -193,7 +193,7 @@ def refuse_overlapping_windows(windows: Sequence[Times]) -> tuple[Times, ...]:
             raise DeckError(f"tr and td are both {tr:g}; give a td after tr")
         if not 0 <= tr < td < math.inf:
             raise DeckError(
-                f"tr is {tr:g} and td is {td:g}, 0 <= tr < td was expected; give the earlier time as tr"
+                f"tr is {tr:g} and td is {td:g}, but 0 <= tr < td was expected; give the earlier time as tr"
             )
     for (tr, td), (later, end) in pairwise(windows):
         if not later > td:

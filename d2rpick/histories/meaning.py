@@ -343,8 +343,8 @@ def refuse_other_quantity(channel: str, where: str) -> None:
     """Raise FormatError if the only column or curve of a file has the name of a different quantity."""
     word = _find_word_of_other_quantity(channel)
     if word:
-        problem = f"{where}: the only values are {channel!r}, by its name not an internal energy ({word})"
-        raise FormatError(f"{problem}; choose with `energy` what to use instead")
+        problem = f"{where}: the only data column is {channel!r}, whose name is not an internal energy ({word})"
+        raise FormatError(f"{problem}; name the column to use with `energy`")
 
 
 def _find_word_of_other_quantity(channel: str) -> str:

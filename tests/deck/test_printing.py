@@ -136,7 +136,7 @@ def test_the_solver_is_that_of_the_history() -> None:
 def test_the_command_line_offers_the_solvers_there_are() -> None:
     assert f"[{'|'.join(SOLVERS)}]" in run("card", "--help").stdout
     assert (
-        f"'abaqus' was found, one of {', '.join(SOLVERS)} was expected"
+        f"'abaqus' was found, but one of {', '.join(SOLVERS)} was expected"
         in read_refusal(
             "card", "--solver", "abaqus", "--tr", "1", "--td", "2", "--part", "1"
         )

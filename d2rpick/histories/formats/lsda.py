@@ -432,7 +432,7 @@ def _read_lsda_header(
     """Return the offset of the first record, the byte order, and the formats of record headers and type codes."""
     header = data[:8]
     if not recognises(header):
-        problem = f"{source}: begins with {header.hex(' ')}, the header of a binout was expected"
+        problem = f"{source}: begins with {header.hex(' ')}, but the header of a binout was expected"
         raise FormatError(f"{problem}; name another file")
     begin, length, _, command, type_id, little = header[:6]
     order = "<" if little else ">"
