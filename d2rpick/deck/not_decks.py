@@ -19,9 +19,9 @@ _TEXT: Final = (
     (rb"(?m)^ mat\.#=", "a matsum of LS-DYNA"),
     (rb"(?m)^ time\.{5}", "a glstat of LS-DYNA"),
     (rb"ZZZZZEOR", "a T01 of Radioss"),
-    # At least two lines that begin with two numbers.
+    # At least two lines that begin with two numbers, without the comments of a deck, which may begin with a table.
     (
-        rb"(?m)(?:^[ \t]*[-+.\d][-+.\deE]*[ \t]*[,;\t ][ \t]*[-+.\d].*\r?\n){2}",
+        rb"(?m)\A(?!(?s:.*)^[#$])(?s:.*?)(?:^[ \t]*[-+.\d][-+.\deE]*[ \t]*[,;\t ][ \t]*[-+.\d].*\r?\n){2}",
         "a table of numbers",
     ),
 )

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from tests.command import ENERGY, MATSUM, ROOT, put, run, run_json
@@ -53,8 +54,8 @@ SWITCHING = str(ROOT / "sample_data" / "switching.k")
         (
             ("replay", "--mass", "1", "--beta", "1"),
             (
-                "missing: --stiffness NUMBER (spring stiffness k); --t-end T (end of the computed run); --dt T (output "
-                "interval); --v0 NUMBER, or some of"
+                "missing: --stiffness NUMBER (spring stiffness k); --t-end T (end of the computed run); "
+                "--dt T (output interval); --v0 NUMBER, or some of"
             ),
         ),
         (
@@ -197,10 +198,13 @@ def test_a_mistyped_run_to_follow_is_compared_with_its_neighbours(
 ) -> None:
     (tmp_path / "run_a").mkdir()
     answer = run("follow", "--once", str(tmp_path / "run_b"))
-    assert answer.exit_code == 1
+    assert answer.exit_code == 2
     assert "(did you mean 'run_a'?)" in answer.stdout
-    assert "exit code 1: the parts do not fly" in answer.stderr
-    assert "did you mean" not in run("follow", "--once", str(tmp_path / "run_a")).stdout
+    assert "exit code 2: there is no such file or folder" in answer.stderr
+    waiting = run("follow", "--once", str(tmp_path / "run_a"))
+    assert waiting.exit_code == 1
+    assert "exit code 1: the parts do not fly" in waiting.stderr
+    assert "did you mean" not in waiting.stdout
 
 
 def test_a_main_node_that_the_deck_lacks_is_refused_with_those_it_has() -> None:
@@ -253,3 +257,76 @@ def test_a_table_written_less_often_for_a_while_keeps_its_flight(
     cut = put(tmp_path / "cut.csv", "\n".join([*rows[:600], *rows[900:]]).encode())
     (flight, *_) = run_json("info", str(cut))["flights"]
     assert flight["end"] == pytest.approx(float(rows[599].split(",")[0]))
+
+
+def test_verify_names_the_best_pair_for_the_given_td_too() -> None:
+    """Before, it named only the nearest good pair, although td may be fixed."""
+    answer = " ".join(
+        run("verify", "--tr", "0.03", "--td", "0.12", ENERGY).stdout.split()
+    )
+    assert (
+        "to improve use tr = 0.0128534, td = 0.119046: vibration error 0.0%, rigid for 0.106193; with the given "
+        "td, tr = 0.0128455, td = 0.12: vibration error 23%, rigid for 0.107155 expect"
+    ) in answer
+
+
+def test_verify_names_the_best_pair_of_the_flight_beside_the_nearest(
+    tmp_path: Path,
+) -> None:
+    time = np.linspace(0, 0.3, 3001)
+    modes = ((35, 0, 1), (61, 1, 0.6), (97, 2, 0.3))
+    energy = np.full(time.size, 3.0)
+    for rate, phase, size in modes:
+        energy += (size * np.cos(2 * np.pi * rate * time + phase)) ** 2
+    rows = "".join(
+        f"{t!r},{e!r}\n" for t, e in zip(time.tolist(), energy.tolist(), strict=True)
+    )
+    table = put(tmp_path / "modes.csv", f"time,internal_energy\n{rows}".encode())
+    answer = run("verify", "--tr", "0.05", "--td", "0.12", str(table)).stdout
+    cure = " ".join(answer.split()).partition("to improve use ")[2]
+    nearest, best = cure.partition(" expect ")[0].split("; best in the flight, ")
+    assert nearest.startswith("tr = 0.0307804, td = 0.1135: vibration error 38%")
+    assert best == "tr = 0.0725888, td = 0.3: vibration error 20%, rigid for 0.227411"
+
+
+def test_the_record_of_a_switched_run_is_called_one(tmp_path: Path) -> None:
+    """Not all parts were rigid, and the solver writes the kinetic energy of rigid parts, so only energies show it."""
+    switched = str(tmp_path / "switched.matsum")
+    times = ("--tr", "0.09", "--td", "0.37")
+    run("rollover", "--mesh", "4", *times, "-o", switched)
+    expected = "rigid-times: this is a switched run, with these rigid parts: box from 0.09 to 0.37; choose times from"
+    for question in (("suggest",), ("explore",), ("plan",), ("verify", *times)):
+        answer = run(*question, "--part", "flying", switched)
+        assert answer.stderr.count(expected) == 1
+    for unswitched in (MATSUM, str(SAMPLES / "rolloverT01.gz")):
+        assert (
+            "rigid-times" not in run("suggest", "--part", "flying", unswitched).stderr
+        )
+
+
+def test_a_flight_after_a_rigid_window_belongs_to_a_switched_run() -> None:
+    """All parts were rigid before the flight, so what the window froze changes its vibration."""
+    legs = [locate_stored(f"drop2_w123_T0{leg}.gz") for leg in range(1, 7)]
+    answer = run("suggest", "--td", "0.5", *legs)
+    assert "this is a switched run" in answer.stderr
+
+
+@pytest.mark.parametrize(
+    ("question", "problem"),
+    [
+        (
+            ("card", "--tr", "0.1", "--td", "0.2", "--part", "1"),
+            "nothing shows that the model has a part 7; give a part of the model as --merge, or the main deck as",
+        ),
+        (
+            ("plan", "--part", "flying", "-f", "card", MATSUM),
+            "the history has no part 7, only box, step; give a part of the model as --merge, or the main deck",
+        ),
+    ],
+)
+def test_a_lead_part_that_nothing_shows_is_a_warning(
+    question: tuple[str, ...], problem: str
+) -> None:
+    answer = run(*question, "--merge", "7")
+    assert f"warning: lead-part-unknown: --merge 7: {problem}" in answer.stderr
+    assert "lead-part-unknown" not in run(*question, "--merge", "1").stderr

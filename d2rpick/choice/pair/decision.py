@@ -97,6 +97,8 @@ class Decision(NamedTuple):
         True if the record ends before the next contact.
     is_compared : bool
         True if a finished switched run was compared with the reference run.
+    other_pairs : tuple of (str, Pair)
+        Further pairs that are better, each with the words that introduce it.
     """
 
     grade: str
@@ -112,6 +114,7 @@ class Decision(NamedTuple):
     best_of: tuple[float, float] | None = None
     ends_in_flight: bool = False
     is_compared: bool = False
+    other_pairs: tuple[tuple[str, Pair], ...] = ()
 
     @property
     def verdict(self) -> str:
@@ -253,7 +256,15 @@ class Decision(NamedTuple):
             # A better pair of the same record cannot be used either.
             return self.cure_without_other_times
         if self.better is not None:
-            return f"use {_describe_pair(self.better, self.better_level)}"
+            best = f"use {_describe_pair(self.better, self.better_level)}"
+            if not self.other_pairs:
+                return best
+            others = [
+                f"{introduction}, {_describe_pair(pair, None)}, rigid for {pair.td - pair.tr:.6g}"
+                for introduction, pair in self.other_pairs
+            ]
+            rigid_time = self.better.td - self.better.tr
+            return "; ".join([f"{best}, rigid for {rigid_time:.6g}", *others])
         if self.is_outside_flight and not self.is_compared:
             return CHOOSE_TIMES_IN_FLIGHT
         if self.objections or not self.quality.causes:

@@ -481,7 +481,7 @@ def _choose_longer_window(
     if by_oscillator is None:
         return by_modes
     is_longer = by_modes.end - by_modes.start > by_oscillator.end - by_oscillator.start
-    return by_modes if is_longer and modes.vibration.is_exact else by_oscillator
+    return by_modes if is_longer and modes.vibration.explains_all else by_oscillator
 
 
 def _skip_first_quarter(
