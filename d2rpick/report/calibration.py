@@ -42,7 +42,7 @@ COLUMNS = ("formulation", "weight", "measured", "told")
 LEG_HEAD = (
     "run",
     "CPU time of a step",
-    "CPU time of the elements in a step",
+    "CPU time of elements",
     "rigid nodes",
 )
 # Weights with a misfit up to this need no caution [-]; it is twice the CPU-time error that the fit assumes.
