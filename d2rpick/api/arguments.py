@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 from collections.abc import Iterable, Mapping, Set
 from typing import TYPE_CHECKING, Any, Final, NoReturn
 
@@ -30,6 +31,9 @@ if TYPE_CHECKING:
 
 # Largest number of characters of an invalid value that are shown in a message.
 _LONGEST_SHOWN: Final = 60
+# Smallest number above 1 that is read as a percentage, and the number that is the whole.
+_LEAST_PERCENT: Final = 2
+_WHOLE: Final = 100
 
 
 def check_number(name: str, value: object, limits: Number = TIME) -> float:
@@ -152,6 +156,32 @@ def suggest_without_unit(value: object) -> str:
     if seconds is None:
         return ""
     return f": give a number in the unit of the run, {seconds:g} if it is s"
+
+
+def suggest_seconds(value: object) -> str:
+    """Explain how to write a time by the clock that was given with a unit; return "" for any other string.
+
+    Examples
+    --------
+    >>> suggest_seconds("5s"), suggest_seconds("five")
+    (': give the seconds as a number, 5', '')
+    """
+    from d2rpick.histories.digits import parse_seconds
+
+    seconds = parse_seconds(str(value))
+    return "" if seconds is None else f": give the seconds as a number, {seconds:g}"
+
+
+def suggest_share(number: float) -> str:
+    """Explain how to write a fraction if a number above 1 looks like a percentage; return "" for any other number.
+
+    Examples
+    --------
+    >>> suggest_share(20.0), suggest_share(1.5), suggest_share(-3.0)
+    ('; for 20% write 0.2', '', '')
+    """
+    is_percentage = _LEAST_PERCENT <= number <= _WHOLE
+    return f"; for {number:g}% write {number / _WHOLE:g}" if is_percentage else ""
 
 
 def suggest_without_percent(value: object, *, is_time: bool) -> str:
@@ -477,18 +507,34 @@ def read_windows(text: str, source: str) -> tuple[tuple[float, float], ...]:
         words = line.split()
         if not words or words[0].startswith("#"):
             continue
+        place = f"{source}:{number}"
         try:
             tr, td = map(float, words)
         except ValueError:
             raise DeckError(
-                f"{source}:{number}: {line.strip()[:60]!r} was found, but two numbers 'tr td' were expected"
+                f"{place}: {line.strip()[:60]!r} was found, but two numbers 'tr td' were expected; "
+                f"{_correct_line(line)}"
             ) from None
+        if tr > td:
+            raise DeckError(
+                f"{place}: tr = {tr:g} lies after td = {td:g}; write the earlier time first"
+            )
         windows.append((tr, td))
     if not windows:
         raise DeckError(
             f"{source}: no window was found, but a line 'tr td' for each was expected"
         )
     return tuple(windows)
+
+
+def _correct_line(line: str) -> str:
+    """Return how to correct a line that is not two numbers separated by blanks."""
+    words = re.split(r"[\s,;]+", line.strip())
+    try:
+        tr, td = map(float, words)
+    except ValueError:
+        return "put # before headings and remarks, or give the journal of d2rpick drive, drive.ndjson"
+    return f"separate them by a blank: {tr:g} {td:g}"
 
 
 def _read_journal(text: str) -> list[tuple[float, float]]:

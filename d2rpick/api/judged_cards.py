@@ -203,9 +203,16 @@ def card(
 
 
 def print_card(
-    windows: Sequence[Times], run: Run | None, request: Request, cards: Cards
+    windows: Sequence[Times],
+    run: Run | None,
+    request: Request,
+    cards: Cards,
+    listed_in: str = "",
 ) -> JudgedCard:
-    """Print the card for windows. If a run is given, judge the printed times with it."""
+    """Print the card for windows. If a run is given, judge the printed times with it.
+
+    Messages on times in another unit name the file that the windows are ``listed_in``.
+    """
     from d2rpick.deck.printing import SOLVERS, find_solver, print_cards
 
     if run is None:
@@ -218,6 +225,8 @@ def print_card(
     from d2rpick.api.asked import ask_run  # Imported here to keep start-up fast.
 
     question = ask_run(run, request, card_alone=True)
+    for tr, td in windows:
+        question.reference.history.check_pair(tr, td, listed_in)
     solver = cards.solver or find_solver(question.reference.history.format)
     cards.check_solver(solver)
     parts = parse_id_ranges("--part", question.on_card)

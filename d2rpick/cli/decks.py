@@ -74,7 +74,7 @@ def card(
     times = _read_windows(tr, td, windows)
     run = options.open_judging_run(request)
     output = output.beside(windows, *(run.sources if run else ()))
-    judged_card = print_card(times, run, request, cards)
+    judged_card = print_card(times, run, request, cards, windows or "")
     question = request.repeat()
     if judged_card.verdicts:
         history = judged_card.verdicts[0].situation.history

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 from click.core import ParameterSource
 
+from d2rpick.api.arguments import suggest_share
 from d2rpick.api.cards import (
     SETTINGS,
     Cards,
@@ -38,6 +39,8 @@ else:
     FloatType = click.ParamType  # This class has been generic since click 8.4.
 
 CARDS: Final = tuple(list_options(Cards))
+# Placeholder of a time that is measured by the clock, not in the unit of the run.
+SECONDS: Final = "SECONDS"
 _PAIR: Final = 2  # Number of values of an option that takes a pair.
 # Options that settings may contain for every command, but that apply only if one of the listed options is given.
 _BESIDE: Final[dict[str | None, tuple[str, ...]]] = {
@@ -64,13 +67,15 @@ class NumberType(FloatType):
         except ValueError:
             from d2rpick.api.arguments import (
                 suggest_decimal_point,
+                suggest_seconds,
                 suggest_without_percent,
                 suggest_without_unit,
             )
 
+            is_by_clock = bool(param and param.metavar == SECONDS)
             hint = (
                 suggest_decimal_point(value)
-                or suggest_without_unit(value)
+                or (suggest_seconds if is_by_clock else suggest_without_unit)(value)
                 or suggest_without_percent(
                     value, is_time=bool(param and param.metavar == "T")
                 )
@@ -83,8 +88,11 @@ class NumberType(FloatType):
         if not math.isfinite(number):
             self.fail(f"{value!r} is not a finite number", param, ctx)
         if limit := self.limits.missed(number):
+            hint = suggest_share(number) if self.limits.high == 1 else ""
             self.fail(
-                f"{value} was found, but a number {limit} was expected", param, ctx
+                f"{value} was found, but a number {limit} was expected{hint}",
+                param,
+                ctx,
             )
         return number
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from d2rpick.base.errors import DeckError
+from d2rpick.base.errors import DeckError, RangeError
 from d2rpick.deck.engine_files import EngineFile, write_engine_lines
 from d2rpick.deck.ls_dyna_parts import read_entities
 from d2rpick.deck.printed_card import (
@@ -156,6 +156,7 @@ def _print_radioss_cards(first_run: FirstRunDeck) -> PrintedCard:
         raise DeckError(f"{load.at}: /{load.name} {_UNSEEN}")
     contacts = require_forces(path, run.starter)
     (leg,) = run.legs
+    _check_wait_against_end(path, wait, leg.stop.value)
     starts_moving = bool(run.starter.named("INIVEL") or leg.starts)
     at_rest = first_run.falls_from_rest(starts_moving=starts_moving)
     first_switch = max(first_run.after or 0.0, wait)
@@ -183,6 +184,16 @@ def _print_radioss_cards(first_run: FirstRunDeck) -> PrintedCard:
         notes.append(_OF_WALLS)
     head = "".join(f"# {line}\n" for line in write_comments([*notes, *PHYSICS]))
     return PrintedCard(head, (), files, tuple(notes), bodies.cards + sensors)
+
+
+def _check_wait_against_end(path: str, wait: float, end: float) -> None:
+    """Raise RangeError if the run ends before the force-free time has passed, so that no flight can be detected."""
+    if wait < end:
+        return
+    raise RangeError(
+        f"{path}: `wait` {wait:g} is not shorter than the run, which ends at {end:g}; give a shorter time, in the unit "
+        "of the deck"
+    )
 
 
 # The functions below write the cards for LS-DYNA.

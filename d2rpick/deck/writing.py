@@ -120,8 +120,12 @@ def write_deck(
             (target / name).parent.mkdir(parents=True, exist_ok=True)
             write_as_a_whole(target / name, content)
     except OSError as error:
+        if os.path.isfile(folder):  # noqa: PTH113  pathlib would slow down start-up
+            reason = "this is a file, but a folder was expected"
+        else:
+            reason = f"cannot be written ({error.strerror})"
         raise DeckError(
-            f"{error.filename or folder}: cannot be written ({error.strerror}); choose another folder"
+            f"{error.filename or folder}: {reason}; choose another folder"
         ) from None
     return [str(target / name) for name in files]
 

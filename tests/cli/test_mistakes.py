@@ -34,7 +34,7 @@ DECK_OF_ANOTHER_MODEL = (
         ),
         (
             "card --tr 0.07 --td 0.06 --part 1",
-            "0 <= tr < td was expected; give the earlier time as tr",
+            "tr < td was expected; give the earlier time as tr",
         ),
         ("card --tr 0,0135 --td 0.2 --part 1", "write it with a decimal point, 0.0135"),
         (f"suggest --part bx {MATSUM}", "did you mean 'box'?"),

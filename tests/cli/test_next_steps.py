@@ -114,7 +114,7 @@ def test_info_refuses_files_whose_flight_lasts_longer_than_the_energy() -> None:
         ),
         (
             ("parts", "--deck", str(SAMPLES / "oscillator"), MATSUM),
-            "cannot be read (this is a folder); check the name, and give the main deck",
+            "this is a folder; give the main deck in it",
         ),
         (
             ("verify", "--tr", "0.0687534", "--td", "0.0135867", ENERGY),

@@ -472,8 +472,8 @@ def _choose_longer_window(
     """Return the window that an oscillator describes, or a longer window that modes describe; None if there is neither.
 
     Modes can follow a drifting mean energy, so they describe longer windows than an oscillator, which cannot. Only
-    modes with a very small misfit may extend beyond the window of an oscillator, because a contact may have ended this
-    window.
+    modes that leave hardly anything or only noise may extend beyond the window of an oscillator, because a contact may
+    have ended this window.
     """
     if modes is None:
         return by_oscillator

@@ -451,7 +451,7 @@ def test_columns_that_cannot_be_told(text: str, asked: list[str], reason: str) -
         ),
         (
             "time,ALLKE\n0,1\n1,2\n",
-            r"'ALLKE', whose name is not an internal energy \(ALLKE\); name the column to use with `energy`",
+            r"'ALLKE', whose name is not an internal energy \(ALLKE\); write the internal energy too",
         ),
         (
             "Nodal History,Z-acceleration\nTime,A8,\n0,1,\n1,2,\n",
