@@ -87,7 +87,7 @@ def explain_unknown_solver(name: object) -> str:
 
     solvers = list_solvers()
     near = suggest_name(str(name), solvers)
-    return f"{name!r} was found{near}, one of {', '.join(solvers)} was expected"
+    return f"{name!r} was found{near}, but one of {', '.join(solvers)} was expected"
 
 
 @dataclass(eq=False, repr=False)
@@ -341,7 +341,7 @@ def parse_id_ranges(
         high = int(match[2] or match[1])
         if low == 0:
             raise ArgumentError(
-                f"{name}: {piece!r} does not fit, ids from 1 were expected; give those that the deck lists"
+                f"{name}: {piece!r} does not fit, but ids from 1 were expected; give those that the deck lists"
             )
         if high < low:
             raise ArgumentError(

@@ -347,7 +347,7 @@ def read_channels(texts: Collection[str]) -> tuple[tuple[str, str], ...]:
     for quantity, name in pairs:
         if quantity not in QUANTITIES:
             near = suggest_name(quantity, tuple(QUANTITIES))
-            known = near or f", one of {', '.join(QUANTITIES)} was expected"
+            known = near or f", but one of {', '.join(QUANTITIES)} was expected"
             raise ArgumentError(
                 f"`channels` {quantity}={name}: unknown quantity {quantity!r}{known}"
             )

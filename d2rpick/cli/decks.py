@@ -99,7 +99,7 @@ def _read_windows(
         return options.read_windows_in(file)
     if len(tr) != len(td):
         raise click.UsageError(
-            f"{len(tr)} --tr and {len(td)} --td were given, a --td for each --tr was expected"
+            f"{len(tr)} --tr and {len(td)} --td were given, but a --td for each --tr was expected"
         )
     return list(zip(tr, td, strict=True))
 

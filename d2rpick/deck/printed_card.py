@@ -201,7 +201,7 @@ def refuse_overlapping_windows(windows: Sequence[Times]) -> tuple[Times, ...]:
             )
         if not tr < td < math.inf:
             raise DeckError(
-                f"tr is {tr:g} and td is {td:g}, tr < td was expected; give the earlier time as tr"
+                f"tr is {tr:g} and td is {td:g}, but tr < td was expected; give the earlier time as tr"
             )
     for (tr, td), (later, end) in pairwise(windows):
         if not later > td:

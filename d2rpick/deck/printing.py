@@ -488,7 +488,7 @@ def _check_run(
         else:
             problem = f"the run ends at {printing.end:g}"
         raise DeckError(
-            f"{problem}, a time after td = {windows[-1][1]:g} was expected; give it as `end`"
+            f"{problem}, but a time after td = {windows[-1][1]:g} was expected; give it as `end`"
         )
     return windows, ids, printing.end
 

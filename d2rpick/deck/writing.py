@@ -121,7 +121,7 @@ def write_deck(
             write_as_a_whole(target / name, content)
     except OSError as error:
         if os.path.isfile(folder):  # noqa: PTH113  pathlib would slow down start-up
-            reason = "this is a file, and a folder was expected"
+            reason = "this is a file, but a folder was expected"
         else:
             reason = f"cannot be written ({error.strerror})"
         raise DeckError(

@@ -387,7 +387,7 @@ def _check_times(history: History, td: float, settings: Settings) -> None:
             count = f"{history.time.size} states were"
         raise RangeError(
             f"{', '.join(history.source)}: {count} found, "
-            f"at least {FEWEST_STATES} were expected; "
+            f"but at least {FEWEST_STATES} were expected; "
             "write the energies more often, or wait until the run has written them"
         )
     history.energy_at(td, "td")
