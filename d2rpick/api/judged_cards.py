@@ -6,7 +6,7 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final, Unpack
 
-from d2rpick.api.card_in_deck import ERROR_OF_CARD
+from d2rpick.api.card_in_deck import ERROR_OF_CARD, warn_about_lead
 from d2rpick.api.cards import Cards, name_needed_argument, parse_id_ranges
 from d2rpick.api.request import CHOOSING_FOR_CARDS, Request
 from d2rpick.base.errors import ArgumentError, Caution
@@ -108,7 +108,8 @@ def judge_and_print(
         apart = 0
     else:
         apart = len(printing.part)
-    return JudgedCard(card, verdicts, tuple(collect_objections(card, question, apart)))
+    objections = collect_objections(card, question, apart, printing.merge)
+    return JudgedCard(card, verdicts, tuple(objections))
 
 
 def _add_bodies(printing: Printing, question: RunQuestion) -> Printing:
@@ -211,7 +212,9 @@ def print_card(
         if request.deck:
             _refuse_history_as_deck(request.deck)
         request.without_history()
-        return JudgedCard(print_cards(windows, _complete_alone(request, cards)))
+        printing = _complete_alone(request, cards)
+        unknown_lead = warn_about_lead(printing.merge, printing.part)
+        return JudgedCard(print_cards(windows, printing), cautions=tuple(unknown_lead))
     from d2rpick.api.asked import ask_run  # Imported here to keep start-up fast.
 
     question = ask_run(run, request, card_alone=True)

@@ -455,7 +455,10 @@ def _read_history(run: OpenedRun, selection: Selection) -> History | None:
     for wanted in (selection.parts, selection.flying):
         if wanted:
             select_parts(wanted, run.parts, run.name)
-    return give_if_written(lambda: run.history(selection))
+    history = give_if_written(lambda: run.history(selection))
+    if history:
+        run.check_energy(history)
+    return history
 
 
 def _explain_missing_energy(

@@ -40,7 +40,8 @@ if TYPE_CHECKING:
     *("part", *CARDS, "deck", "no_deck", *REFERENCE, *FILES, "exit_zero"),
     deck="Main deck that belongs to --history; it defines which parts become one rigid body.",
     part={
-        "help": "Parts to switch, by number (3,7) or range (10-19), or with --history by title.",
+        "help": "Parts to switch: number (3,7) or range (10-19); with --history also title, "
+        '"flying", "all" or, with --deck too, "recommended".',
         "type": choose_click_type("names"),
         "instead_of": (),
     },

@@ -152,7 +152,7 @@ class Output:
             by_itself or self.output_format == "card" or self.report is not None
         ):
             raise ArgumentError(
-                f"--{make_option_name(cards.given[0])} is about the card; ask for one with -f card or --report"
+                f"--{make_option_name(cards.given[0])} is an option of the card; get one with -f card or --report FILE"
             )
 
     def shown(self, **further: Any) -> DisplayOptions:

@@ -19,6 +19,7 @@ from d2rpick.report.formats import FORMATS
 if TYPE_CHECKING:
     from d2rpick.api.drives import Driving
     from d2rpick.api.request import Request
+    from d2rpick.report.follow import Event
 
 
 CMD = ("program", "CMD")
@@ -136,12 +137,15 @@ def _plan(driving: Driving) -> list[str]:
     import shlex
 
     from d2rpick.report.parts import format_count
+    from d2rpick.report.tables import quote_shell_line
 
     deck = driving.deck
     commands = driving.commands
     bodies = ", ".join(map(str, deck.nodes))
     typed = click.get_current_context().meta["d2rpick.command"]
-    again = shlex.join(["d2rpick", *(word for word in typed if word != "--dry-run")])
+    again = quote_shell_line(
+        ["d2rpick", *(word for word in typed if word != "--dry-run")]
+    )
     missing = commands.missing()
     correct = (
         f"correct --starter or --engine, because there is no program {missing!r}, then "
@@ -192,6 +196,9 @@ def follow(
     d2rpick prints a line for each event: load, flight with its evidence, recommended switch, contact, restart, silence,
     end.  RUN need not have started.  d2rpick does not start, stop or change anything.
 
+    With --once and --for, the exit code is 0 if the parts fly at the last state.  It is 1 if they do not fly but the
+    run may continue, and 2 if the run has ended without flying parts or RUN does not exist.
+
     Examples
     --------
     d2rpick follow --once --part box sample_data/rolloverT01.gz
@@ -202,12 +209,14 @@ def follow(
     if once and lasting is not None:
         raise click.UsageError("--once and --for exclude each other")
     seconds = 0.0 if once else lasting
-    failed, since = False, None
+    last: Event | None = None
+    ending = ""
     for event in events(
         run, parts=request.part or None, wait=wait, deck=request.deck, lasting=seconds
     ):
-        failed = failed or event.event == "failed"
-        since = event.time
+        last = event
+        if event.event in ("ended", "failed", "restart"):
+            ending = event.event
         if output.output_format == "ndjson":
             text = json.dumps(event._asdict(), allow_nan=False)
         else:
@@ -219,10 +228,40 @@ def follow(
             ),
             nl=False,
         )
-    is_on_ground = seconds is not None and since is None
-    if is_on_ground and not failed and not output.exit_zero:
-        tell("d2rpick: exit code 1: the parts do not fly at the last state")
-    output.finish(objection=failed or is_on_ground)
+    if seconds is None:
+        output.finish(objection=ending == "failed")
+    else:
+        assert last is not None
+        _finish_look(run, last, ending, output)
+
+
+def _finish_look(run: str, last: Event, ending: str, output: Output) -> None:
+    """Exit with 0 if the parts fly at the last state, 2 if they never will, and otherwise 1.
+
+    A script that waits for a flight needs the difference between 1 and 2. ``ending`` is the last event that ends or
+    restarts the run.
+    """
+    if last.seen is None and not _exists(run):
+        tell("d2rpick: exit code 2: there is no such file or folder")
+        click.get_current_context().exit(2)
+    code, reason = 0, ""
+    if ending == "failed":
+        code, reason = 2, "the run has ended with an error"
+    elif last.time is None and ending == "ended":
+        code, reason = 2, "the run has ended, and the parts do not fly"
+    elif last.time is None:
+        code, reason = 1, "the parts do not fly at the last state"
+    if code and not output.exit_zero:
+        tell(f"d2rpick: exit code {code}: {reason}")
+        click.get_current_context().exit(code)
+
+
+def _exists(run: str) -> bool:
+    """Return True if a name is that of a file or folder, or a pattern that matches one."""
+    from glob import glob
+    from pathlib import Path
+
+    return Path(run).exists() or bool(glob(run, recursive=True))  # noqa: PTH207  Path.glob needs the folder
 
 
 @options.make_command_with_needs(list_needs_of_first)

@@ -43,6 +43,13 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "assumes that it is. If it is another load, the parts do not fly freely.",
             "Give the deck with --deck, or write the mass, or the kinetic and internal energy.",
         ),
+        "landing-not-shown": Explanation(
+            "The record shows that the parts fly on after the landing that you gave. What happens there is not in the "
+            "record: an airbag that fires, or a contact of another variant. d2rpick does not know its energy, so it "
+            "grades the vibration after td by its error alone, as with --keep-vibration.",
+            "Nothing to do for such an event. For a contact of this run, give the time at which the force begins, or "
+            "omit --landing.",
+        ),
         "grazing-contact": Explanation(
             "The body only grazes another surface at the end of the flight. If the body is slightly out of place, "
             "this contact may come much earlier.",
@@ -313,6 +320,11 @@ EXPLANATIONS_BY_TOPIC: Final = {
         "parts-not-in-deck": Explanation(
             "Parts of the history are missing from the deck, so their costs and connections are unknown.",
             "Give the deck of this run, with all its include files.",
+        ),
+        "lead-part-unknown": Explanation(
+            "The card merges the parts into a lead part that the history does not contain. LS-DYNA stops with an error "
+            "if the model has no such part.",
+            "Give the deck with --deck, so that d2rpick checks the card, or give a part of the model with --merge.",
         ),
         "parts-not-joined": Explanation(
             "The card makes several parts rigid, each as a separate rigid body. If they share nodes, they must form "

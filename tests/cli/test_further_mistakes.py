@@ -200,10 +200,13 @@ def test_a_mistyped_run_to_follow_is_compared_with_its_neighbours(
 ) -> None:
     (tmp_path / "run_a").mkdir()
     answer = run("follow", "--once", str(tmp_path / "run_b"))
-    assert answer.exit_code == 1
+    assert answer.exit_code == 2
     assert "(did you mean 'run_a'?)" in answer.stdout
-    assert "exit code 1: the parts do not fly" in answer.stderr
-    assert "did you mean" not in run("follow", "--once", str(tmp_path / "run_a")).stdout
+    assert "exit code 2: there is no such file or folder" in answer.stderr
+    waiting = run("follow", "--once", str(tmp_path / "run_a"))
+    assert waiting.exit_code == 1
+    assert "exit code 1: the parts do not fly" in waiting.stderr
+    assert "did you mean" not in waiting.stdout
 
 
 def test_a_main_node_that_the_deck_lacks_is_refused_with_those_it_has() -> None:
@@ -284,9 +287,7 @@ def test_verify_names_the_best_pair_of_the_flight_beside_the_nearest(
     cure = " ".join(answer.split()).partition("to improve use ")[2]
     nearest, best = cure.partition(" expect ")[0].split("; best in the flight, ")
     assert nearest.startswith("tr = 0.0307804, td = 0.1135: vibration error 38%")
-    assert (
-        best == "tr = 0.0725888, td = 0.3: vibration error 20%, rigid for 0.227411"
-    )
+    assert best == "tr = 0.0725888, td = 0.3: vibration error 20%, rigid for 0.227411"
 
 
 def test_the_record_of_a_switched_run_is_called_one(tmp_path: Path) -> None:
@@ -309,3 +310,24 @@ def test_a_flight_after_a_rigid_window_belongs_to_a_switched_run() -> None:
     legs = [locate_stored(f"drop2_w123_T0{leg}.gz") for leg in range(1, 7)]
     answer = run("suggest", "--td", "0.5", *legs)
     assert "this is a switched run" in answer.stderr
+
+
+@pytest.mark.parametrize(
+    ("question", "problem"),
+    [
+        (
+            ("card", "--tr", "0.1", "--td", "0.2", "--part", "1"),
+            "nothing shows that the model has a part 7; give a part of the model as --merge, or the main deck as",
+        ),
+        (
+            ("plan", "--part", "flying", "-f", "card", MATSUM),
+            "the history has no part 7, only box, step; give a part of the model as --merge, or the main deck",
+        ),
+    ],
+)
+def test_a_lead_part_that_nothing_shows_is_a_warning(
+    question: tuple[str, ...], problem: str
+) -> None:
+    answer = run(*question, "--merge", "7")
+    assert f"warning: lead-part-unknown: --merge 7: {problem}" in answer.stderr
+    assert "lead-part-unknown" not in run(*question, "--merge", "1").stderr

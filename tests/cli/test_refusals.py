@@ -97,7 +97,7 @@ explore --steps 0 {ENERGY} | --steps
 plan --all {ENERGY} | --all belongs to -f value, -f card and --write-deck
 plan --before {BOX} {BOX} | name its windows with --done
 plan -f card {ENERGY} | needs --part
-plan --node 3 {ENERGY} | is about the card
+plan --node 3 {ENERGY} | is an option of the card
 plan --done nowhere.txt {BOX} | nowhere.txt: no such file; check the name and the folder
 plan --min-rigid -1 {BOX} | at least 0
 parts --tr 0.1 {MATSUM} | --tr needs --td
