@@ -27,7 +27,7 @@ from d2rpick.deck.radioss_sensors import require_forces
 from d2rpick.deck.reader import read_deck
 from d2rpick.deck.sensor_cards import write_flight_sensors
 from d2rpick.deck.suiting import find_suiting
-from d2rpick.deck.switch_sets import Waiting, write_set_pair
+from d2rpick.deck.switch_sets import Waiting, write_joint_remarks, write_set_pair
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -205,18 +205,22 @@ def _print_ls_dyna_cards(first_run: FirstRunDeck) -> PrintedCard:
     deck = read_deck(path)
     contact, keyword = _find_contact(path, deck)
     part_ids = check_ids(first_run.parts)
-    suiting = find_suiting(path, part_ids)
+    bodies = first_run.inventory.bodies(part_ids)
+    suiting = find_suiting(path, part_ids, bodies)
     printing = Printing(
         part=tuple(part_ids),
-        bodies=first_run.inventory.bodies(part_ids),
+        bodies=bodies,
         swset=suiting.swset or Printing().swset,
         delete_nodal_bodies=suiting.delete_nodal_bodies,
         delete_node_sets=suiting.delete_node_sets,
+        parting=suiting.parting,
+        kept_joints=suiting.kept_joints,
     )
     offset, offset_note = _choose_offset(first_run.inventory, keyword)
     notes = [first_run.explain_wait(), *_OF_ALL, *_OF_LS_DYNA, offset_note]
     if suiting.delete_nodal_bodies or suiting.delete_node_sets:
         notes.append(_DELETED)
+    notes += write_joint_remarks(printing)
     if after is None:
         starts_moving = bool(deck.named("INITIAL_VELOCITY"))
         at_rest = first_run.falls_from_rest(starts_moving=starts_moving)
