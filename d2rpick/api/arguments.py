@@ -479,7 +479,8 @@ def read_windows(text: str, source: str) -> tuple[tuple[float, float], ...]:
             tr, td = map(float, words)
         except ValueError:
             raise DeckError(
-                f"{source}:{number}: {line.strip()[:60]!r} was found, two numbers 'tr td' were expected"
+                f"{source}:{number}: {line.strip()[:60]!r} was found, two numbers 'tr td' were expected; give "
+                "each window a line with both times"
             ) from None
         windows.append((tr, td))
     if not windows:

@@ -202,12 +202,12 @@ def follow(
     if once and lasting is not None:
         raise click.UsageError("--once and --for exclude each other")
     seconds = 0.0 if once else lasting
-    failed, since = False, None
+    failed, since, seen = False, None, None
     for event in events(
         run, parts=request.part or None, wait=wait, deck=request.deck, lasting=seconds
     ):
         failed = failed or event.event == "failed"
-        since = event.time
+        since, seen = event.time, event.seen
         if output.output_format == "ndjson":
             text = json.dumps(event._asdict(), allow_nan=False)
         else:
@@ -221,7 +221,12 @@ def follow(
         )
     is_on_ground = seconds is not None and since is None
     if is_on_ground and not failed and not output.exit_zero:
-        tell("d2rpick: exit code 1: the parts do not fly at the last state")
+        problem = (
+            "no state could be read"
+            if seen is None
+            else "the parts do not fly at the last state"
+        )
+        tell(f"d2rpick: exit code 1: {problem}")
     output.finish(objection=failed or is_on_ground)
 
 

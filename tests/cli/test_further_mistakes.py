@@ -284,9 +284,7 @@ def test_verify_names_the_best_pair_of_the_flight_beside_the_nearest(
     cure = " ".join(answer.split()).partition("to improve use ")[2]
     nearest, best = cure.partition(" expect ")[0].split("; best in the flight, ")
     assert nearest.startswith("tr = 0.0307804, td = 0.1135: vibration error 38%")
-    assert (
-        best == "tr = 0.0725888, td = 0.3: vibration error 20%, rigid for 0.227411"
-    )
+    assert best == "tr = 0.0725888, td = 0.3: vibration error 20%, rigid for 0.227411"
 
 
 def test_the_record_of_a_switched_run_is_called_one(tmp_path: Path) -> None:

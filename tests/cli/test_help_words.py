@@ -115,5 +115,6 @@ def test_no_help_shows_an_expression_of_python() -> None:
         assert re.search(r"\{(?!(?:deck|threads)\})", text) is None, name
     helps = dict(list_options())
     assert (
-        "either reference_m, published_m and better_m, or z_m" in helps["reproduce --solver"]
+        "either reference_m, published_m and better_m, or z_m"
+        in helps["reproduce --solver"]
     )

@@ -314,4 +314,4 @@ def test_too_few_states_are_named_as_the_cause_that_no_flight_is_seen(
     table.write_text("\n".join([head, *rows]) + "\n")
     text = " ".join(run(command, str(table)).stdout.split())
     assert "write the states every 0.00055 or more often" in text
-    assert "because 12 states may miss a flight" in text
+    assert "because 12 states may miss a flight or a peak" in text
