@@ -1,8 +1,8 @@
 """The indexes of the frequently asked questions: each question with a link, and the bold text of its answer.
 
-``python -m tests.questions`` writes them to docs/how-to: start-faq.md (first steps), files-faq.md (files), faq.md
-(planning), model-faq.md (the model), switched-faq.md (cards and switched run) and scripts-faq.md (scripts, CI, many
-runs), so that each can be scanned at a glance; a test holds them current.
+``python -m tests.questions`` writes them to docs/how-to: start-faq.md (first steps), files-faq.md (files of a run),
+faq.md (planning), model-faq.md (the model), switched-faq.md (cards and switched run) and scripts-faq.md (scripts, CI,
+many runs), so that each can be scanned at a glance; a test holds them current.
 """
 
 from __future__ import annotations

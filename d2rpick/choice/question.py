@@ -34,7 +34,7 @@ class Reference(NamedTuple):
 
     @classmethod
     def of(cls, run: OpenedRun, selection: Selection = _DEFAULT) -> Reference:
-        """Read the selected energy of an open run; raise FormatError if it is missing."""
+        """Read the selected energy of an open run; raise FormatError if it is missing, HistoryError if it is wrong."""
         if selection.parts:
             # Imported here to keep start-up fast.
             from d2rpick.flight.momentum import (
@@ -42,7 +42,9 @@ class Reference(NamedTuple):
             )
 
             selection = replace_words_by_part_ids(run, selection)
-        return cls(run, run.history(selection))
+        history = run.history(selection)
+        run.check_energy(history)
+        return cls(run, history)
 
     def like(self, run: OpenedRun, selection: Selection = _DEFAULT) -> Reference:
         """Read the same parts from another run of the model, even if the selection gave them different names."""

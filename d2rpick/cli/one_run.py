@@ -23,12 +23,12 @@ from d2rpick.cli import options
 from d2rpick.cli.options import (
     ANSWER,
     DECK,
-    DECK_OF_PARTS,
     FILES,
     HISTORY,
     ONE_RUN,
     RESULT,
     WINDOW,
+    WITH_RECOMMENDED,
 )
 from d2rpick.cli.output import (
     IN_WORDS,
@@ -132,7 +132,7 @@ def extract(write_as: str | None, request: Request, output: Output) -> None:
     "limit",
     *ONE_RUN,
     *ANSWER,
-    deck=DECK_OF_PARTS,
+    **WITH_RECOMMENDED,
     min_quality=f"{MIN_QUALITY}  [default: fair; poor if only --td is given]",
     forms=[*FORMATS["suggestion"], "card"],
 )
@@ -250,7 +250,7 @@ def _finish_answer(
         "default": 10,
         "help": "Number of rows in the table of the best pairs; json and csv contain all pairs.",
     },
-    deck=DECK_OF_PARTS,
+    **WITH_RECOMMENDED,
     forms=FORMATS["trade_off"],
 )
 def explore(
@@ -328,7 +328,7 @@ def _list_needs_of_pair(values: Mapping[str, Any]) -> Iterable[str]:
     ),
     default=MIN_MEAN_ENERGY,
 )
-@options.add_options(*ONE_RUN, *ANSWER, deck=DECK_OF_PARTS, forms=FORMATS["verdict"])
+@options.add_options(*ONE_RUN, *ANSWER, **WITH_RECOMMENDED, forms=FORMATS["verdict"])
 def verify(
     tr: float | None,
     td: float | None,
@@ -479,7 +479,7 @@ def parts(tr: float | None, td: float | None, request: Request, output: Output) 
         *CARDS,
         *RESULT,
     ),
-    deck=DECK_OF_PARTS,
+    **WITH_RECOMMENDED,
     forms=[*FORMATS["plan"], "card"],
 )
 def plan(

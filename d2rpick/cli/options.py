@@ -55,9 +55,12 @@ DECK: Final = (
     "Main deck of the run (LS-DYNA, or a starter or engine file of Radioss): defines the cost of the parts, and "
     "which of them become one rigid body"
 )
-DECK_OF_PARTS: Final = (
-    f"{DECK}.  `--part recommended` is the set that d2rpick parts recommends."
-)
+# Help of the commands that accept the recommended set of parts, which follows from the deck.
+WITH_RECOMMENDED: Final = {
+    "deck": f"{DECK}.  `--part recommended` is the set that d2rpick parts recommends.",
+    "part": 'Parts to switch: number (3,7), range (10-19), title, "flying", "all" or, with a deck, "recommended"; '
+    "energies are added.",
+}
 # Sections of the help; options that belong to no section come first.
 _CARDS: Final = "Cards"
 GROUPS: Final[dict[str, tuple[str, ...]]] = {
@@ -190,9 +193,10 @@ class Command(Documented):
         if ctx.meta.get("d2rpick.show-settings"):
             return click.echo(encode_text("\n".join(_list_settings(ctx))))
         if (words := list_words(ctx)) and not ctx.params.get("quiet"):
-            import shlex  # Imported here to keep start-up fast.
+            # Imported here to keep start-up fast.
+            from d2rpick.report.tables import quote_shell_line
 
-            tell(f"note: {shlex.join(words)} by {ctx.meta['d2rpick.settings']}")
+            tell(f"note: {quote_shell_line(words)} by {ctx.meta['d2rpick.settings']}")
         convert_typed_times(ctx)
         # numpy is imported here, at a small call depth, because its import makes many nested calls.
         # In Python 3.11, nested calls are slow if they repeatedly cross the end of a chunk of the call stack.

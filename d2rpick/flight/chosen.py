@@ -12,6 +12,7 @@ from d2rpick.flight.flight import (
     BY_ENERGIES,
     MOST_WORK,
     Flight,
+    find_all_seen,
     get_agreement_limit,
     name_source,
 )
@@ -255,8 +256,10 @@ def end_flight_at(
             refusal=None,
             source="given",
             doubts=_add_refusal_to_doubts(flight),
+            shows_contact=shows_contact_at(history, flight, landing),
         )
     doubts = flight.doubts
+    shows_contact = shows_contact_at(history, flight, landing)
     room = get_agreement_limit(history, *flight.within(history.time))
     if (
         flight.end is not None
@@ -269,7 +272,23 @@ def end_flight_at(
             f"{evidence}, before `landing` {landing:.6g}, which is used nevertheless",
         )
         flight = flight._replace(source="given")
-    return flight._replace(end=landing, doubts=doubts)
+    return flight._replace(end=landing, doubts=doubts, shows_contact=shows_contact)
+
+
+def shows_contact_at(history: History, flight: Flight, landing: float) -> bool:
+    """Return False if the record shows that the parts fly on after a ``landing`` given by the user [time].
+
+    The flights that the evidence shows decide or, if it shows none, the ``flight`` itself before it is ended. Its end
+    may differ from the landing as much as the ends of a flight in two sources.
+    """
+    seen = [
+        (window.start, window.end if window.end_seen else inf)
+        for _, window in find_all_seen(history)
+    ]
+    if not seen and flight.start is not None and not flight.refusal:
+        seen = [(flight.start, inf if flight.end is None else flight.end)]
+    room = get_agreement_limit(history, *flight.within(history.time))
+    return not any(start < landing < end - room for start, end in seen)
 
 
 def _is_elsewhere(flight: Flight, td: float, after: float) -> bool:

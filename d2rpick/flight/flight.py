@@ -58,7 +58,8 @@ class Flight(NamedTuple):
     [1/time]. ``gravity`` is the acceleration that is assumed to be gravity [length/time^2], see `FreeFlight`.
     ``doubts`` lists contradictions between sources.  For a flight from the energy alone, ``settled`` is the time when
     the energy had settled; the time from there to ``start`` is left unused for safety.  ``described`` is True if one
-    oscillator describes the energy in the flight.
+    oscillator describes the energy in the flight.  ``shows_contact`` is False if the user gave the end and the record
+    shows that the parts fly on, so that the event at the end, such as an airbag that fires, is not in the record.
     """
 
     start: float | None = None
@@ -71,6 +72,7 @@ class Flight(NamedTuple):
     settled: float | None = None
     gravity: float = 0.0
     described: bool = False
+    shows_contact: bool = True
 
     def within(self, time: Samples) -> tuple[float, float]:
         """Return the window of the flight [time]; an unknown end is replaced by the end of the record at times (n,)."""

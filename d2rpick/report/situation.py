@@ -82,6 +82,8 @@ def list_situation_heading(
         lines.append(("flight", "unknown"))
     else:
         end = "no next contact found" if flight.end is None else f"to {flight.end:.6g}"
+        if not flight.shows_contact:
+            end += " (given; the record shows no contact there)"
         parts = [
             part.name if part.title else str(part.id) for part in flight.parts or ()
         ]

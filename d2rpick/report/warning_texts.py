@@ -43,6 +43,13 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "assumes that it is. If it is another load, the parts do not fly freely.",
             "Give the deck with --deck, or write the mass, or the kinetic and internal energy.",
         ),
+        "landing-not-shown": Explanation(
+            "The record shows that the parts fly on after the landing that you gave. What happens there is not in the "
+            "record: an airbag that fires, or a contact of another variant. d2rpick does not know its energy, so it "
+            "grades the vibration after td by its error alone, as with --keep-vibration.",
+            "Nothing to do for such an event. For a contact of this run, give the time at which the force begins, or "
+            "omit --landing.",
+        ),
         "grazing-contact": Explanation(
             "The body only grazes another surface at the end of the flight. If the body is slightly out of place, "
             "this contact may come much earlier.",
@@ -417,7 +424,8 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "Name the same parts for all runs by their numbers with --part.",
         ),
         "mixed-units": Explanation(
-            "The runs have different time units, but td is a single value.",
+            "The runs have different time units, by their files or because the times of some are 1000 times those of "
+            "others. A study has one unit for td and tr.",
             "Convert the runs to one unit, or study the runs of each unit separately.",
         ),
         "runs-left-out": Explanation(

@@ -19,6 +19,7 @@ from d2rpick.base.errors import Caution
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.choice.answers import suggest_in_run
 from d2rpick.choice.health import WRONG_ENERGY, refuse_unsound, warn_about_engine
+from d2rpick.choice.pair.warnings import LANDING_NOT_SHOWN
 from d2rpick.choice.parts.margins import find_margin
 from d2rpick.choice.switched.frozen import RIGID_TIMES
 from d2rpick.choice.switched.switched_run import (
@@ -468,11 +469,12 @@ def _warn_about_windows(
             yield Caution("landed-rigid", window)
         elif done.flight is None:
             yield Caution("done-without-flight", window)
-    windows = [row for row in rows if row.status == "supported" and row.answer]
-    for row in windows:
+    for row in rows:
         for caution in row.answer.cautions if row.answer else ():
-            # These warnings concern the whole run, not a single flight.
-            if caution.code in (WRONG_ENERGY, RIGID_TIMES):
+            # The first warning concerns the given landing, with or without a window before it; the others concern
+            # the whole run, not a single flight.
+            is_told = row.status == "supported" or caution.code == LANDING_NOT_SHOWN
+            if not is_told or caution.code in (WRONG_ENERGY, RIGID_TIMES):
                 continue
             which = f"flight {row.number}: " if len(rows) > 1 else ""
             yield caution._replace(message=which + caution.message)
