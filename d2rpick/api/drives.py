@@ -106,6 +106,14 @@ class Driving:
             warn_about_solver(self.deck.parts, self.inventory)
         )
 
+    def refuse_other_files(self) -> None:
+        """Raise D2RPickError if the folder contains files, but no run that was begun there."""
+        folder = self.folder
+        if not folder.is_dir() or (folder / JOURNAL).exists():
+            return
+        if any(not file.name.startswith(".") for file in folder.iterdir()):
+            raise D2RPickError(f"{folder}: the folder is not empty; choose another one")
+
     @contextmanager
     def driver(self, *, resume: bool) -> Iterator[Driver]:
         """Lock the run's folder against other drivers, and yield the driver.
@@ -132,12 +140,8 @@ class Driving:
                 raise D2RPickError(
                     f"{folder}: this run was begun with another deck than {self.name} is now; give that deck"
                 )
-            if not begun and any(
-                not file.name.startswith(".") for file in folder.iterdir()
-            ):
-                raise D2RPickError(
-                    f"{folder}: the folder is not empty; choose another one"
-                )
+            if not begun:
+                self.refuse_other_files()
             if not computed:  # The user may have corrected the deck or the command.
                 journal.path.unlink(missing_ok=True)
                 journal = Journal(journal.path)

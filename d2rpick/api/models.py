@@ -113,12 +113,9 @@ class Motion:
         _ = self.oscillator
         if (self.tr is None) != (self.td is None):
             raise ArgumentError("give --tr and --td together")
-        if self.tr is not None and self.td is not None and not self.tr < self.td:
-            raise ArgumentError(f"--tr {self.tr:g} is not before --td {self.td:g}")
-        if self.t_end / self.dt > MOST_REPLAYED:
-            raise ArgumentError(
-                f"--t-end {self.t_end:g} holds more than {MOST_REPLAYED} intervals of --dt {self.dt:g}"
-            )
+        if self.tr is not None and self.td is not None:
+            _check_windows((self.tr,), (self.td,), self.t_end)
+        _check_interval(self.dt, self.t_end, MOST_REPLAYED)
 
     @property
     def start(self) -> State:
@@ -236,10 +233,7 @@ class Box:
             raise ArgumentError(
                 "--tilt belongs to --drop; the floor of the sled keeps its own"
             )
-        if self.end / self.dt > MOST_STATES:
-            raise ArgumentError(
-                f"--t-end {self.end:g} holds more than {MOST_STATES} intervals of --dt {self.dt:g}"
-            )
+        _check_interval(self.dt, self.end, MOST_STATES)
 
     @property
     def end(self) -> float:
@@ -279,6 +273,18 @@ class Box:
         from d2rpick.models.box_run import simulate
 
         return simulate(self.parameters, self.end, *rigid, interval=self.dt)
+
+
+def _check_interval(interval: float, t_end: float, most: int) -> None:
+    """Raise ArgumentError unless a run holds at least one output interval [time], and no more than ``most``."""
+    if interval > t_end:
+        raise ArgumentError(
+            f"--dt {interval:g} is longer than the run, --t-end {t_end:g}; give a shorter interval"
+        )
+    if t_end / interval > most:
+        raise ArgumentError(
+            f"--t-end {t_end:g} holds more than {most} intervals of --dt {interval:g}"
+        )
 
 
 def _check_windows(

@@ -117,6 +117,7 @@ def drive(
     driving = Driving(deck, Path(folder), report, **driving_options)
     output.notes(driving.deck.notes, driving.cautions)
     if dry_run:
+        driving.refuse_other_files()
         click.echo("\n".join(_plan(driving)))
         return output.finish(objection=bool(driving.commands.missing()))
     signal.signal(signal.SIGTERM, signal.default_int_handler)

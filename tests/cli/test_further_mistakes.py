@@ -331,34 +331,3 @@ def test_a_lead_part_that_nothing_shows_is_a_warning(
     answer = run(*question, "--merge", "7")
     assert f"warning: lead-part-unknown: --merge 7: {problem}" in answer.stderr
     assert "lead-part-unknown" not in run(*question, "--merge", "1").stderr
-
-
-def test_a_later_restart_segment_alone_is_not_used() -> None:
-    """Before, plan recommended times in the last segment of a switched run, and info called the second one switched."""
-    folder = ROOT / "sample_data" / "oscillator_switched"
-    for number, earlier in ((2, "OSCT01.gz; name it too"), (3, "OSCT02.gz; name them")):
-        leg = str(folder / f"OSCT0{number}.gz")
-        for command in (
-            ("suggest",),
-            ("plan",),
-            ("explore",),
-            ("verify", "--tr", "0.06", "--td", "0.1"),
-        ):
-            refusal = run(*command, leg)
-            assert refusal.exit_code == 2
-            assert "and the start of the run is in " in refusal.stderr
-            assert earlier in refusal.stderr
-        screen = " ".join(run("info", leg).stdout.split())
-        assert screen.startswith("record do not use it to choose times")
-        assert "next read the other restart segments too with d2rpick info " in screen
-
-
-def test_a_segment_in_which_all_parts_are_rigid_is_not_used(tmp_path: Path) -> None:
-    """Without the segments before it, nothing but its part output shows that it is that of a switched run."""
-    packed = (ROOT / "sample_data" / "oscillator_switched" / "OSCT02.gz").read_bytes()
-    leg = str(put(tmp_path / "OSCT02.gz", packed))
-    refusal = run("suggest", leg)
-    assert refusal.exit_code == 2
-    assert "this is a switched run, whose parts are rigid throughout" in refusal.stderr
-    plan = " ".join(run("plan", leg).stdout.split())
-    assert plan.startswith("do not use any window of this run: it was switched")
