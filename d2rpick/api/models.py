@@ -115,11 +115,7 @@ class Motion:
             raise ArgumentError("give --tr and --td together")
         if self.tr is not None and self.td is not None and not self.tr < self.td:
             raise ArgumentError(f"--tr {self.tr:g} is not before --td {self.td:g}")
-        _check_interval(self.dt, self.t_end)
-        if self.t_end / self.dt > MOST_REPLAYED:
-            raise ArgumentError(
-                f"--t-end {self.t_end:g} holds more than {MOST_REPLAYED} intervals of --dt {self.dt:g}"
-            )
+        _check_interval(self.dt, self.t_end, MOST_REPLAYED)
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -247,11 +243,7 @@ class Box:
             _check_windows(self.tr, self.td, self.end)
         if self.tilt is not None and self.drop is None:
             raise ArgumentError("--tilt needs --drop: it is the tilt of a falling box")
-        _check_interval(self.dt, self.end)
-        if self.end / self.dt > MOST_STATES:
-            raise ArgumentError(
-                f"--t-end {self.end:g} holds more than {MOST_STATES} intervals of --dt {self.dt:g}"
-            )
+        _check_interval(self.dt, self.end, MOST_STATES)
 
     @property
     def end(self) -> float:
@@ -293,11 +285,15 @@ class Box:
         return simulate(self.parameters, self.end, *rigid, interval=self.dt)
 
 
-def _check_interval(dt: float, t_end: float) -> None:
-    """Raise ArgumentError if the output interval is longer than the run, which would give a single state."""
-    if dt > t_end:
+def _check_interval(interval: float, t_end: float, most: int) -> None:
+    """Raise ArgumentError unless a run holds at least one output interval [time], and no more than ``most``."""
+    if interval > t_end:
         raise ArgumentError(
-            f"--dt {dt:g} is longer than the run, --t-end {t_end:g}; give a shorter --dt"
+            f"--dt {interval:g} is longer than the run, --t-end {t_end:g}; give a shorter --dt"
+        )
+    if t_end / interval > most:
+        raise ArgumentError(
+            f"--t-end {t_end:g} holds more than {most} intervals of --dt {interval:g}"
         )
 
 

@@ -413,6 +413,21 @@ def find_unread_legs(files: Sequence[str]) -> list[str]:
     return [leg for leg in find_later_legs(continued) if leg not in given]
 
 
+def find_earlier_legs(files: Sequence[str]) -> list[str]:
+    """Return the restart segments of a Radioss run that lie next to its ``files`` and precede the first of them."""
+    matches = [match for file in files if (match := _RADIOSS_LEG.fullmatch(file))]
+    if not matches:
+        return []
+    first = min(matches, key=lambda match: int(match[2]))
+    names = (f"{first[1]}{number:02d}" for number in range(1, int(first[2])))
+    return [
+        name
+        for stem in names
+        for name in (stem, f"{stem}.gz")
+        if os.path.isfile(name)  # noqa: PTH113  pathlib would slow down start-up
+    ]
+
+
 def find_later_legs(names: Sequence[str]) -> list[str]:
     """Return the later restart segments next to these files that the user did not name."""
     from pathlib import Path  # Imported here to keep start-up fast.

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final
 from d2rpick.base.errors import COPY_AGAIN, list_names, make_printable
 from d2rpick.choice.pair.grades import DO_NOT_USE, USE, USE_WITH_CARE
 from d2rpick.flight.flight import NEVER_FLIES
-from d2rpick.histories.source import find_unread_legs
+from d2rpick.histories.source import find_earlier_legs, find_unread_legs
 from d2rpick.report import tables
 from d2rpick.report.formats import RepeatedQuestion
 from d2rpick.report.situation import (
@@ -83,12 +83,17 @@ def list_overview_lines(overview: Overview) -> list[tuple[str, str]]:
     lines += [("flight", format_flight(*flight)) for flight in overview.flights]
     if overview.energies:
         return [*lines, ("next", _name_step_to_energy(overview))]
-    unread = find_unread_legs(overview.source)
-    if unread:
+    earlier = find_earlier_legs(overview.source)
+    later = find_unread_legs(overview.source)
+    if earlier or later:
         which = [*_list_given_selection(overview)]
-        files = tables.make_positional((*overview.source, *unread))
+        files = tables.make_positional((*earlier, *overview.source, *later))
         line = tables.quote_shell_line(("d2rpick", "info", *which, *files))
-        return [*lines, ("next", f"read the later restart segments too with {line}")]
+        which_legs = "other" if earlier else "later"
+        return [
+            *lines,
+            ("next", f"read the {which_legs} restart segments too with {line}"),
+        ]
     if overview.verdict == DO_NOT_USE:
         is_known = overview.unjudged or overview.rigid
         if overview.rigid and not overview.unjudged:
