@@ -45,17 +45,17 @@ def check_number(name: str, value: object, limits: Number = TIME) -> float:
     1.0
     >>> check_number("margin", -1, Number(0.0))
     Traceback (most recent call last):
-    ValueError: margin is -1, a number of at least 0 was expected
+    ValueError: margin is -1, but a number of at least 0 was expected
     """
     if not is_number(value):
         raise TypeError(
-            f"{name} is {_format_wrong_value(value)}, a number was expected{suggest_without_unit(value)}"
+            f"{name} is {_format_wrong_value(value)}, but a number was expected{suggest_without_unit(value)}"
         )
     converted = float(value)  # type: ignore[arg-type]  # is_number() excludes other types
     if not math.isfinite(converted):
-        raise ValueError(f"{name} is {converted}, a finite number was expected")
+        raise ValueError(f"{name} is {converted}, but a finite number was expected")
     if limit := limits.missed(converted):
-        raise ValueError(f"{name} is {converted:g}, a number {limit} was expected")
+        raise ValueError(f"{name} is {converted:g}, but a number {limit} was expected")
     return converted
 
 
@@ -101,7 +101,7 @@ def check_flag(name: str, value: object, default: bool) -> bool:
     kind = getattr(getattr(value, "dtype", None), "kind", "")
     if not isinstance(value, bool) and (kind != "b" or getattr(value, "ndim", 0)):
         raise TypeError(
-            f"{name} is {_format_wrong_value(value)}, True or False was expected"
+            f"{name} is {_format_wrong_value(value)}, but True or False was expected"
         )
     return bool(value)
 
@@ -123,7 +123,7 @@ def check_windows(name: str, value: object) -> list[tuple[float, float]]:
         times = check_time_window(f"{name}[{number_of_pair}]", pair)
         if times is None:
             raise TypeError(
-                f"{name}[{number_of_pair}] is None, a pair of times was expected"
+                f"{name}[{number_of_pair}] is None, but a pair of times was expected"
             )
         windows.append(times)
     return windows
@@ -223,7 +223,7 @@ def check_time_window(name: str, value: object) -> tuple[float, float] | None:
         return None
     if not _is_pair(value):
         raise TypeError(
-            f"{name} is {_format_wrong_value(value)}, a pair of times was expected"
+            f"{name} is {_format_wrong_value(value)}, but a pair of times was expected"
         )
     first, last = list(value)  # type: ignore[call-overload]  # _is_pair() excludes other types
     times = check_number(f"{name}[0]", first), check_number(f"{name}[1]", last)
@@ -300,11 +300,11 @@ def check_whole_number(name: str, value: object, low: int) -> int:
     --------
     >>> check_whole_number("steps", 2.5, 1)
     Traceback (most recent call last):
-    TypeError: steps is 2.5, a whole number was expected
+    TypeError: steps is 2.5, but a whole number was expected
     """
     if not is_whole_number(value):
         raise TypeError(
-            f"{name} is {_format_wrong_value(value)}, a whole number was expected"
+            f"{name} is {_format_wrong_value(value)}, but a whole number was expected"
         )
     return int(check_number(name, value, Number(low)))
 
@@ -375,7 +375,7 @@ def check_option(name: str, value: object, option: Option, default: Any = None) 
     --------
     >>> check_option("min_quality", "best", OPTIONS["min_quality"])
     Traceback (most recent call last):
-    ValueError: min_quality is 'best', one of poor, fair, good was expected
+    ValueError: min_quality is 'best', but one of poor, fair, good was expected
     """
     kind: Any = option.kind
     if value is None:
@@ -393,10 +393,12 @@ def check_option(name: str, value: object, option: Option, default: Any = None) 
     if isinstance(kind, Number):
         return check_number(name, value, kind)
     if not isinstance(value, str):
-        raise TypeError(f"{name} is {_format_wrong_value(value)}, a text was expected")
+        raise TypeError(
+            f"{name} is {_format_wrong_value(value)}, but a text was expected"
+        )
     if isinstance(kind, tuple) and value not in kind:
         raise ValueError(
-            f"{name} is {_format_wrong_value(value)}, one of {', '.join(kind)} was expected"
+            f"{name} is {_format_wrong_value(value)}, but one of {', '.join(kind)} was expected"
         )
     return value
 
@@ -429,7 +431,7 @@ def check_two_whole_numbers(name: str, value: object, low: int) -> tuple[int, in
     """Return two whole numbers that are at least ``low``."""
     if not _is_pair(value):
         raise TypeError(
-            f"{name} is {_format_wrong_value(value)}, a pair of numbers was expected"
+            f"{name} is {_format_wrong_value(value)}, but a pair of numbers was expected"
         )
     first, second = list(value)  # type: ignore[call-overload]  # _is_pair() excludes other types
     return check_whole_number(name, first, low), check_whole_number(name, second, low)
@@ -443,7 +445,7 @@ def _check_oscillator(value: object) -> Oscillator | None:
 
     if not isinstance(value, Oscillator):
         raise TypeError(
-            f"oscillator is {_format_wrong_value(value)}, a d2rpick.Oscillator was expected"
+            f"oscillator is {_format_wrong_value(value)}, but a d2rpick.Oscillator was expected"
         )
     return value
 
@@ -459,7 +461,7 @@ def check_weights(value: object) -> Any:
 
     if not isinstance(value, Weights):
         raise TypeError(
-            f"weights is {_format_wrong_value(value)}, d2rpick.Weights or the name of a file was expected"
+            f"weights is {_format_wrong_value(value)}, but d2rpick.Weights or the name of a file was expected"
         )
     return value
 
@@ -481,7 +483,7 @@ def check_path(name: str, value: Path) -> str:
     """Return the name of a single file."""
     names = list_paths(name, value)
     if len(names) > 1:
-        raise ValueError(f"{name} names {len(names)} files, one was expected")
+        raise ValueError(f"{name} names {len(names)} files, but one was expected")
     return names[0]
 
 
@@ -510,7 +512,8 @@ def read_windows(text: str, source: str) -> tuple[tuple[float, float], ...]:
             tr, td = map(float, words)
         except ValueError:
             raise DeckError(
-                f"{place}: {line.strip()[:60]!r} was found, two numbers 'tr td' were expected; {_correct_line(line)}"
+                f"{place}: {line.strip()[:60]!r} was found, but two numbers 'tr td' were expected; "
+                f"{_correct_line(line)}"
             ) from None
         if tr > td:
             raise DeckError(
@@ -519,7 +522,7 @@ def read_windows(text: str, source: str) -> tuple[tuple[float, float], ...]:
         windows.append((tr, td))
     if not windows:
         raise DeckError(
-            f"{source}: no window was found, a line 'tr td' for each was expected"
+            f"{source}: no window was found, but a line 'tr td' for each was expected"
         )
     return tuple(windows)
 

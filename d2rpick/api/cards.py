@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from d2rpick.api.choosing import JudgingOptions
     from d2rpick.api.runs import Run
     from d2rpick.deck.printed_card import CardSolver as Module, Printing
+    from d2rpick.flight.position_error import RigidBody
 
 # This pattern is compiled at its first use, to keep start-up fast.
 _RANGE: Final = r"(\d{1,10})(?:\s*-\s*(\d{1,10}))?"
@@ -86,7 +87,7 @@ def explain_unknown_solver(name: object) -> str:
 
     solvers = list_solvers()
     near = suggest_name(str(name), solvers)
-    return f"{name!r} was found{near}, one of {', '.join(solvers)} was expected"
+    return f"{name!r} was found{near}, but one of {', '.join(solvers)} was expected"
 
 
 @dataclass(eq=False, repr=False)
@@ -205,38 +206,45 @@ class Cards:
         """
         from d2rpick.deck.printing import find_solver
 
-        parts = parse_id_ranges("--part", question.on_card)
-        printing, notes = self._suit_deck(question, parts)
-        printing = self.replace_in(printing, parts)
+        printing, notes = self._suit_question(question)
         history_format = question.reference.history.format
         self.check_solver(printing.solver or find_solver(history_format))
         return printing, notes
 
-    def _suit_deck(
-        self, question: RunQuestion, parts_on_card: Sequence[int]
-    ) -> tuple[Printing, tuple[str, ...]]:
-        """Return what the deck of the run requires of a card, with notes on rigid bodies that the deck lacks.
-
-        ``parts_on_card`` contains the parts to be switched if the history has no parts.
-
-        The deck defines the solver, the name and end of the run, free ids, the constraints that have to be deleted, and
-        the rigid bodies that switch the parts.
-        """
+    def _suit_question(self, question: RunQuestion) -> tuple[Printing, tuple[str, ...]]:
+        """Return the options of a card, completed with what the deck of the run requires of it, with notes."""
         from d2rpick.deck.printed_card import Printing
 
-        printing = Printing()
-        deck = question.deck
-        if deck is None:
+        on_card = parse_id_ranges("--part", question.on_card)
+        if question.deck is None:
             name = find_run_name(question.reference.history.source)
-            return printing._replace(name=name or printing.name), ()
+            printing = Printing()
+            printing = printing._replace(name=name or printing.name)
+            return self.replace_in(printing, on_card), ()
+        history_parts = question.reference.history.parts or ()
+        parts = on_card or [part.id for part in history_parts]
+        bodies = find_bodies_on_card(question, parts) or ()
+        printing, notes = self.suit_deck(question.deck, parts, bodies)
+        return self.replace_in(printing, on_card), notes
+
+    def suit_deck(
+        self, deck: str, parts: Sequence[int], bodies: Sequence[RigidBody]
+    ) -> tuple[Printing, tuple[str, ...]]:
+        """Return what a deck requires of a card that switches ``parts``, with notes on missing rigid bodies.
+
+        The deck defines the solver, the name and end of the run, free ids, the constraints that have to be deleted, and
+        the rigid bodies that switch the parts. The parts become the rigid ``bodies``, unless the card merges all parts.
+        """
+        from d2rpick.deck.printed_card import Printing
         from d2rpick.deck.printing import SOLVERS
         from d2rpick.deck.suiting import find_suiting
 
-        history_parts = question.reference.history.parts or ()
-        parts = parts_on_card or [part.id for part in history_parts]
-        suiting = find_suiting(deck, parts)
+        joined = [body.parts for body in bodies]
+        if self.merge is not None:
+            joined = [(*parts, self.merge)]
+        suiting = find_suiting(deck, parts, joined)
         solver = self.solver or suiting.solver
-        printing = printing._replace(solver=solver)
+        printing = Printing(solver=solver)
         if SOLVERS[solver].title != SOLVERS[suiting.solver].title:
             return printing, ()
         if suiting.solver == "ls-dyna":
@@ -244,6 +252,8 @@ class Cards:
                 swset=suiting.swset or printing.swset,
                 delete_nodal_bodies=suiting.delete_nodal_bodies,
                 delete_node_sets=suiting.delete_node_sets,
+                parting=suiting.parting,
+                kept_joints=suiting.kept_joints,
             ), ()
         name = suiting.name or printing.name
         printing = printing._replace(name=name, end=suiting.end)
@@ -253,13 +263,13 @@ class Cards:
             return printing, ()
         from d2rpick.deck.radioss_bodies import find_bodies
 
-        bodies = find_bodies(deck, parts)
+        found = find_bodies(deck, parts)
         return printing._replace(
-            node=tuple(bodies.nodes),
-            replaced=bodies.replaced,
-            starter=bodies.cards,
-            sensor=bodies.sensor,
-        ), bodies.notes
+            node=tuple(found.nodes),
+            replaced=found.replaced,
+            starter=found.cards,
+            sensor=found.sensor,
+        ), found.notes
 
     def _refuse_unknown_nodes(self, deck: str) -> None:
         """Raise DeckError if a main node belongs to no rigid body of the deck: the engine would skip it silently."""
@@ -274,6 +284,18 @@ class Cards:
                 f"{deck}: no rigid body has the main node {', '.join(unknown)}; give those of the bodies to be "
                 f"switched as `node`: the deck has {known}"
             )
+
+
+def find_bodies_on_card(
+    question: RunQuestion, parts: Sequence[int]
+) -> tuple[RigidBody, ...] | None:
+    """Return the rigid bodies that the parts of a card become according to the deck; None if there is no deck."""
+    if question.on_card and question.model and question.deck:
+        # Imported here to keep start-up fast.
+        from d2rpick.choice.parts.deck_of_run import find_rigid_bodies
+
+        return find_rigid_bodies(question.model.inventory, parts)
+    return question.settings.bodies
 
 
 # Keys of the settings that apply to all commands. All other keys apply to the rules or to a single command.
@@ -319,7 +341,7 @@ def parse_id_ranges(
         high = int(match[2] or match[1])
         if low == 0:
             raise ArgumentError(
-                f"{name}: {piece!r} does not fit, ids from 1 were expected; give those that the deck lists"
+                f"{name}: {piece!r} does not fit, but ids from 1 were expected; give those that the deck lists"
             )
         if high < low:
             raise ArgumentError(

@@ -365,7 +365,7 @@ def warn_if_unbalanced(record: Record) -> tuple[Caution, ...]:
     imbalance = float(abs(record.imbalance).max())
     if imbalance <= BALANCED:
         return ()
-    message = f"the energy is balanced within {imbalance:.2g} of the largest total, {BALANCED} was expected"
+    message = f"the energy is balanced within {imbalance:.2g} of the largest total, but {BALANCED} was expected"
     return (
         Caution(
             "energy-balance",

@@ -295,11 +295,9 @@ class Request(ChoiceOptions, ReadingOptions):
         )
 
     def without_history(self) -> None:
-        """Refuse options for judging windows if there is no history."""
+        """Refuse options for judging windows if there is no history; the deck of a card needs none."""
         if lost := [
-            name
-            for name in self._given()
-            if name in {*JUDGING, *CHOOSING, "deck", "no_deck"}
+            name for name in self._given() if name in {*JUDGING, *CHOOSING, "no_deck"}
         ]:
             raise ArgumentError(
                 f"`{lost[0]}` needs an energy history; give one with `history`"
@@ -349,7 +347,7 @@ def read_channels(texts: Collection[str]) -> tuple[tuple[str, str], ...]:
     for quantity, name in pairs:
         if quantity not in QUANTITIES:
             near = suggest_name(quantity, tuple(QUANTITIES))
-            known = near or f", one of {', '.join(QUANTITIES)} was expected"
+            known = near or f", but one of {', '.join(QUANTITIES)} was expected"
             raise ArgumentError(
                 f"`channels` {quantity}={name}: unknown quantity {quantity!r}{known}"
             )

@@ -83,14 +83,16 @@ class NumberType(FloatType):
             if param and param.nargs == _PAIR and not hint:
                 hint = ": two numbers were expected"
             if param and param.metavar == "T" and not hint:
-                hint = ", a time in the unit of the run was expected, such as 0.005"
+                hint = ", but a time in the unit of the run was expected, such as 0.005"
             self.fail(f"{value!r} is not a number{hint}", param, ctx)
         if not math.isfinite(number):
             self.fail(f"{value!r} is not a finite number", param, ctx)
         if limit := self.limits.missed(number):
             hint = suggest_share(number) if self.limits.high == 1 else ""
             self.fail(
-                f"{value} was found, a number {limit} was expected{hint}", param, ctx
+                f"{value} was found, but a number {limit} was expected{hint}",
+                param,
+                ctx,
             )
         return number
 
@@ -111,7 +113,9 @@ class WholeNumber(click.IntRange):
         is_within = number is not None and (least or 0) <= number
         if number is None or not is_within or (most is not None and number > most):
             self.fail(
-                f"{value} was found, a whole number {limits} was expected", param, ctx
+                f"{value} was found, but a whole number {limits} was expected",
+                param,
+                ctx,
             )
         return number
 
@@ -128,7 +132,7 @@ class File(click.types.StringParamType):
         name = super().convert(value, param, ctx)
         if "\0" in name:
             self.fail(
-                f"{name!r} holds a NUL byte, the name of a file was expected",
+                f"{name!r} holds a NUL byte, but the name of a file was expected",
                 param,
                 ctx,
             )
@@ -338,7 +342,7 @@ def _list_given_settings(
     for name in COMMANDS:
         if name in shared:
             raise ConfigurationError(
-                f"{source}: {name} is {format_toml_value(shared[name])}, a table was expected"
+                f"{source}: {name} is {format_toml_value(shared[name])}, but a table was expected"
             )
     refuse_unknown_settings(shared, (*RULE_KEYS, *SETTINGS), source)
     refuse_unknown_settings(tables, (*COMMANDS, "severity"), source)
@@ -369,7 +373,7 @@ def _read_value(
     ):
         expected = "a list" if option.nargs > 1 else _name_expected_kind(option)
         raise ConfigurationError(
-            f"{position} is {format_toml_value(value)}, {expected} was expected"
+            f"{position} is {format_toml_value(value)}, but {expected} was expected"
         )
     try:
         converted = option.type_cast_value(ctx, values if has_list else value)

@@ -39,6 +39,7 @@ from d2rpick.deck.radioss_columns import (
 from d2rpick.deck.switch_sets import (
     Waiting,
     group_by_lead,
+    write_joint_remarks,
     write_set_pair,
 )
 
@@ -260,6 +261,7 @@ def _write_warnings(ids: Sequence[int], printing: Printing) -> Iterator[str]:
         *(_NODE_SETS_DELETED if printing.delete_node_sets else ()),
     )
     yield from (
+        *write_comments([*write_joint_remarks(printing)]),
         *PHYSICS,
         *(deleted or _LEFT_ACTIVE),
         "Springs and dampers are not switched.",
@@ -486,7 +488,7 @@ def _check_run(
         else:
             problem = f"the run ends at {printing.end:g}"
         raise DeckError(
-            f"{problem}, a time after td = {windows[-1][1]:g} was expected; give it as `end`"
+            f"{problem}, but a time after td = {windows[-1][1]:g} was expected; give it as `end`"
         )
     return windows, ids, printing.end
 

@@ -335,7 +335,7 @@ class History:
             if not is_finite.all():
                 bad = int(is_finite.argmin())
                 raise HistoryError(
-                    f"{where}: {name} of state {bad + 1} is {values[bad]}, a finite number was expected"
+                    f"{where}: {name} of state {bad + 1} is {values[bad]}, but a finite number was expected"
                 )
         if np.any(time[1:] <= time[:-1]):
             state = int(np.argmax(np.diff(time) <= 0)) + 1

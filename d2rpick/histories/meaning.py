@@ -365,7 +365,7 @@ def refuse_other_quantity(channel: str, where: str) -> None:
     """Raise FormatError if the only column or curve of a file has the name of a different quantity."""
     word = _find_word_of_other_quantity(channel)
     if word:
-        problem = f"{where}: the only values are {channel!r}, by its name not an internal energy ({word})"
+        problem = f"{where}: the only data column is {channel!r}, whose name is not an internal energy ({word})"
         raise FormatError(
             f"{problem}; write the internal energy too, or give this name as `energy` if it is one after all"
         )

@@ -236,7 +236,7 @@ def _list_databases(folder: Path) -> list[str]:
         )
     runs = sorted({*databases.values()})
     if len(runs) > 1:
-        problem = f"{folder}: this folder contains {SEVERAL_RUNS} ({list_names(runs, most=5)}), one was expected"
+        problem = f"{folder}: this folder contains {SEVERAL_RUNS} ({list_names(runs, most=5)}), but one was expected"
         raise FormatError(f"{problem}; give the files of one run")
     return [str(file) for file in databases]
 

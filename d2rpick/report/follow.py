@@ -141,7 +141,7 @@ def _describe_event(event: RunEvent, *, is_past: bool) -> Event:
     else:
         message = _describe_advice(event, flight.wait)
         if is_past:
-            message = f"advice that came during the run: {message}"
+            message = f"advice during the run, now out of date: {message}"
     wait = flight.wait.time
     return Event(event.event, event.time, event.seen, message, wait, left, event.tr)
 
@@ -177,8 +177,8 @@ def _describe_advice(event: RunEvent, wait: Wait) -> str:
             f"waiting until {event.time:.6g} for its maximum"
         )
     return (
-        f"switch now: the internal energy, {energy:.4g}, is near {span}; it is not compared with the energy at td, "
-        f"which is unknown yet{warning}"
+        f"switch now: the internal energy, {energy:.4g}, is near {span}; it was not compared with the energy at td, "
+        f"which is not known yet{warning}"
     )
 
 

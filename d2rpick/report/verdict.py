@@ -405,7 +405,7 @@ def list_deviations(switched: Comparison) -> list[tuple[str, str]]:
     rows = []
     if error is not None:
         rows.append(
-            ("largest error of the momentum after td", f"{error:.2g} of its maximum")
+            ("largest momentum error after td", f"{error:.2g} of the largest momentum")
         )
     if displacement is not None:
         rows.append(("largest displacement after td", f"{displacement:.3g}"))

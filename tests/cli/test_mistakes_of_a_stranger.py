@@ -37,7 +37,7 @@ def refuse(*arguments: str) -> str:
             "b.rad: unexpected, because d2rpick drive takes one DECK; leave it out, or",
         ),
         (("follow", "--for", "5s", MATSUM), "'5s' is not a number: give the seconds as a number, 5"),
-        (("drive", str(PLATE), "-o", "new", "--threads", "0"), "0 was found, a whole number of at least 1"),
+        (("drive", str(PLATE), "-o", "new", "--threads", "0"), "0 was found, but a whole number of at least 1"),
         (("drive", str(PLATE), "-o", "new", "--part", "all", *PROGRAMS), "give the ids of parts in the deck"),
         (
             ("drive", str(PLATE.parent), "-o", "new", *PROGRAMS),
@@ -47,7 +47,7 @@ def refuse(*arguments: str) -> str:
         (("card", "--part", "10-5", "--tr", "0.1", "--td", "0.2"), "give the smaller number first, 5-10"),
         (
             ("card", "--solver", "radioss", "--node", "5", "--tr", "0.01", "--td", "0.06", "--end", "0.05"),
-            "the run ends at 0.05, a time after td = 0.06 was expected; give it as --end",
+            "the run ends at 0.05, but a time after td = 0.06 was expected; give it as --end",
         ),
         (("rollover", "--tilt", "30"), "--tilt needs --drop: it is the tilt of a falling box"),
         (("rollover", "--t-end", "0.001", "--dt", "0.01"), "--dt 0.01 is longer than the run, --t-end 0.001"),
@@ -282,7 +282,7 @@ def test_a_file_is_no_folder_for_a_deck(tmp_path: Path) -> None:
     answer = refuse(
         "plan", "--deck", DECK, "--write-deck", file, "--part", "1,2", MATSUM
     )
-    assert "file.txt: this is a file, and a folder was expected; choose another" in (
+    assert "file.txt: this is a file, but a folder was expected; choose another" in (
         answer
     )
     answer = refuse("extract", ENERGY, "-o", str(tmp_path))

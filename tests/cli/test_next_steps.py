@@ -197,7 +197,7 @@ def test_info_leads_to_the_later_restart_segments_that_were_not_named() -> None:
 
 def test_without_part_energies_no_part_is_called_unable_to_be_switched() -> None:
     text = find_line("make rigid", "parts", "--deck", DECK, ENERGY)
-    assert text == "unknown: this history does not contain single parts"
+    assert text == "unknown: the history contains no data for individual parts"
 
 
 def test_a_better_pair_that_verify_refuses_is_not_offered() -> None:

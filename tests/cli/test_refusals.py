@@ -104,7 +104,7 @@ parts --tr 0.1 {MATSUM} | --tr needs --td
 parts --tr 0.3 --td 0.1 {MATSUM} | tr must lie before td
 parts --weights site.toml {MATSUM} | --weights needs --deck
 parts --deck absent.k {MATSUM} | absent.k
-parts --deck {MATSUM} {MATSUM} | this is a matsum of LS-DYNA, a deck was expected
+parts --deck {MATSUM} {MATSUM} | this is a matsum of LS-DYNA, but a deck was expected
 parts --energy 1 {MATSUM} | --energy names one energy
 parts --part 77 --deck {SAMPLE} {MATSUM} | no part 77
 parts --part recommended --deck {SAMPLE} {MATSUM} | name a set to compare

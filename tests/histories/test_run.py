@@ -204,7 +204,7 @@ def test_companions_of_other_times_are_doubted() -> None:
     )
     with pytest.raises(
         FormatError,
-        match="glstat and matsum have no time in common, files of one run were expected",
+        match="glstat and matsum have no time in common, but files of one run were expected",
     ):
         open_companions(
             {

@@ -254,7 +254,7 @@ class Blocks(Database):
         text = self.text(address, self._grammar.width).decode("latin-1").strip()
         problem = f"{self.source}:{count_line_number(self._data, address)}: {_name_field(names[column])} is {text!r}"
         raise FormatError(
-            f"{problem}, a number in its columns was expected; cut the file before this state"
+            f"{problem}, but a number in its columns was expected; cut the file before this state"
         )
 
     def _run_of(self, state: int) -> tuple[Stretch, int]:

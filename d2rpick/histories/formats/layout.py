@@ -310,7 +310,7 @@ def _refuse_odd_rows(
                 f"{source}:{number}: {quote_start(line)} differs from the rows below"
             )
             raise FormatError(
-                f"{problem}, {table.columns} values were expected; repair or delete the line"
+                f"{problem}, but {table.columns} values were expected; repair or delete the line"
             )
 
 
