@@ -102,7 +102,7 @@ class Cards:
         "LS-DYNA: lead part into which all others are merged (LRB).", _IDS, "ID"
     )
     swset: tuple[int, int] | None = make_option(
-        "LS-DYNA: switch sets of the first window; the next ids follow.  [default: 901 902]",
+        "LS-DYNA: switch sets of the first window; further windows use the next ids.  [default: 901 902]",
         _IDS,
         "ID ID",
         pair=True,
@@ -121,12 +121,12 @@ class Cards:
         metavar="NAME",
     )
     contact: int | None = make_option(
-        "Contact whose force switches (solvers ls-dyna-contact, radioss-contact).",
+        "Contact whose force triggers the switch (solvers ls-dyna-contact, radioss-contact).",
         _IDS,
         "ID",
     )
     wall: int | None = make_option(
-        "Rigid wall whose force switches (the same solvers).", _IDS, "ID"
+        "Rigid wall whose force triggers the switch (the same solvers).", _IDS, "ID"
     )
 
     @classmethod

@@ -6,7 +6,7 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final, Unpack
 
-from d2rpick.api.card_in_deck import ERROR_OF_CARD
+from d2rpick.api.card_in_deck import ERROR_OF_CARD, warn_about_lead
 from d2rpick.api.cards import (
     Cards,
     find_bodies_on_card,
@@ -116,8 +116,10 @@ def judge_and_print(
     card, verdicts = result
     card = replace(card, notes=(*notes, *card.notes))
     apart = _count_separate_parts(printing)
-    cautions = tuple(collect_objections(card, question.deck, apart))
-    return JudgedCard(card, verdicts, cautions)
+    objections = collect_objections(
+        card, question.deck, apart, printing.merge, reference.run.parts
+    )
+    return JudgedCard(card, verdicts, tuple(objections))
 
 
 def _count_separate_parts(printing: Printing) -> int:
@@ -220,10 +222,14 @@ def print_card(
     from d2rpick.deck.printing import SOLVERS, find_solver, print_cards
 
     if run is None:
+        if request.deck:
+            _refuse_history_as_deck(request.deck)
         request.without_history()
         if request.deck is not None:
             return _print_in_deck(windows, request.deck, request, cards)
-        return JudgedCard(print_cards(windows, _complete_alone(request, cards)))
+        printing = _complete_alone(request, cards)
+        unknown_lead = warn_about_lead(printing.merge, printing.part)
+        return JudgedCard(print_cards(windows, printing), cautions=tuple(unknown_lead))
     from d2rpick.api.asked import ask_run  # Imported here to keep start-up fast.
 
     question = ask_run(run, request, card_alone=True)
@@ -264,7 +270,9 @@ def _print_in_deck(
     cautions = (
         *warn_about_bodies(parts, inventory),
         *warn_about_solver(parts, inventory),
-        *collect_objections(card, deck, _count_separate_parts(printing)),
+        *collect_objections(
+            card, deck, _count_separate_parts(printing), printing.merge
+        ),
     )
     return JudgedCard(card, (), cautions)
 
@@ -281,6 +289,13 @@ def _require_switched(printing: Printing, cards: Cards) -> None:
         raise ArgumentError(name_needed_argument(module))
     if "end" in module.takes and printing.end is None:
         raise ArgumentError(_NEEDS_END.format(module.title))
+
+
+def _refuse_history_as_deck(name: str) -> None:
+    """Raise DeckError if a file that was given as a deck is a history."""
+    from d2rpick.deck.source import SourceFile  # Imported here to keep start-up fast.
+
+    SourceFile(name).refuse_history()
 
 
 def _complete_alone(request: Request, cards: Cards) -> Printing:

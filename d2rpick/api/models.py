@@ -89,7 +89,7 @@ class Motion:
     td: float | None = make_option(
         "Switch back to deformable at this time.", NOT_NEGATIVE, "T"
     )
-    t_end: float = make_option("Last time.", POSITIVE, "T")
+    t_end: float = make_option("End of the computed run.", POSITIVE, "T")
     dt: float = make_option("Output interval.", POSITIVE, "T")
     write_as: str | None = make_option(
         "Format of the result.  [default: suffix of -o, else csv]", HISTORIES
@@ -190,11 +190,11 @@ class Box:
         "Number of processes of a scan.  [default: one per core]", range(1, UNLIMITED)
     )
     t_end: float | None = make_option(
-        "Last time.  [default: 0.42, with --drop 1.2]", POSITIVE, "T"
+        "End of the run.  [default: 0.42; if --drop is given, 1.2]", POSITIVE, "T"
     )
     dt: float = make_option("Output interval.", POSITIVE, "T", default=1e-4)
     speed: float | None = make_option(
-        "Speed of the sled at the start, or of a falling box along x, m/s.  [default: 7, with --drop 0]",
+        "Speed of the sled at the start, or of a falling box along x, in m/s.  [default: 7; if --drop is given, 0]",
         NOT_NEGATIVE,
     )
     stiffness: float | None = make_option(

@@ -93,7 +93,7 @@ class ReadingOptions:
         "Time column, by name, number or HDF5 path.", metavar="NAME|NUMBER"
     )
     energy: tuple[str, ...] = make_option(
-        "Energy column, label or HDF5 path; repeat the option to add several.",
+        "Energy column, label or HDF5 path; repeat the option to sum several energies.",
         *("channels", "NAME|NUMBER"), many=True, instead_of=("part",),
     )  # fmt: skip
     part: tuple[str, ...] = make_option(
@@ -334,9 +334,9 @@ def read_channels(texts: Collection[str]) -> tuple[tuple[str, str], ...]:
     for quantity, name in pairs:
         if quantity not in QUANTITIES and name:
             near = suggest_name(quantity, tuple(QUANTITIES))
+            known = near or f", one of {', '.join(QUANTITIES)} was expected"
             raise ArgumentError(
-                f"`channels` {quantity}={name}: unknown quantity {quantity!r}{near}, one of {', '.join(QUANTITIES)} "
-                "was expected"
+                f"`channels` {quantity}={name}: unknown quantity {quantity!r}{known}"
             )
         if not name:
             raise ArgumentError(

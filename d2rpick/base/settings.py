@@ -159,8 +159,9 @@ def refuse_unknown_settings(
             names_of_keys = list_names(tuple(known), most=_MOST_KEYS_NAMED)
             place = locate_setting(source, name, table)
             named_table = f" {table}:" if table else ""
+            unknown = f"unknown key {format_toml_value(name)}{hint}"
             raise ConfigurationError(
-                f"{place}:{named_table} unknown key {name!r}{hint}, one of {names_of_keys} was expected; "
+                f"{place}:{named_table} {unknown}, one of {names_of_keys} was expected; "
                 "--show-settings lists those of a command"
             )
 

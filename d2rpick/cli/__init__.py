@@ -24,20 +24,26 @@ if TYPE_CHECKING:
 # Commands for one run come first, then commands for many runs and decks, then commands that compute runs.
 _WORK: Final = {
     "info": ("one_run", "Show what is in the files of a run."),
-    "drive": ("running", "Compute a Radioss run that switches itself."),
+    "drive": (
+        "running",
+        "Compute a Radioss run and switch its parts at the right times.",
+    ),
     "plan": ("one_run", "Plan the rigid windows of all flights of a run."),
     "suggest": ("one_run", "Choose tr for a td, or both times."),
-    "explore": ("one_run", "Show what each td costs."),
+    "explore": ("one_run", "Compare values of td: error, rigid time and saving."),
     "parts": ("one_run", "List which parts may be switched, and what that saves."),
     "verify": ("one_run", "Judge a pair of times, or a finished switched run."),
     "study": ("study", "Choose tr for many runs, and one tr for all."),
     "follow": (
         "running",
-        "Watch a run while it is computed: when it flies, when to switch.",
+        "Watch a running computation: when the parts fly, when to switch.",
     ),
     "extract": ("one_run", "Write the chosen energy as csv or hdf5."),
     "card": ("decks", "Print solver input for switching windows."),
-    "first": ("running", "Write a deck whose first run switches itself."),
+    "first": (
+        "running",
+        "Write a deck in which the solver chooses the switching times.",
+    ),
     "check": ("decks", "Check the switches of decks, also against a run."),
     "rule": ("decks", "Explain a rule of check, or list all."),
     "calibrate": ("study", "Fit the cost of elements to your own runs."),
@@ -56,9 +62,7 @@ _LIBRARIES: Final = ("click", "numpy", "scipy", "pandas", "h5py", "matplotlib")
 _TIMES: Final = ("--tr", "--td")
 # Largest difference in similarity between the best match for a mistyped option and others that are suggested [-].
 _LESS_ALIKE: Final = 0.1
-_VERSIONS: Final = (
-    "Show the version, and those of the libraries it stands on, and exit."
-)
+_VERSIONS: Final = "Show the versions of d2rpick and of its libraries, and exit."
 
 
 class _PipeClosed(Exception):  # noqa: N818  this is not an error: the reader of the pipe needs no more output

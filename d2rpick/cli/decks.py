@@ -8,6 +8,7 @@ import click
 
 from d2rpick.base.errors import INTERNAL_ERROR
 from d2rpick.cli import options
+from d2rpick.cli.missing import list_needs_of_card
 from d2rpick.cli.options import FILES, REFERENCE, RESULT
 from d2rpick.cli.output import (
     Output,
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
     from d2rpick.api.request import Request
 
 
-@options.make_command
+@options.make_command_with_needs(list_needs_of_card)
 @options.make_time_option(
     "--tr", "Switch to rigid at this time; repeatable.", many=True
 )
@@ -91,15 +92,11 @@ def card(
 def _read_windows(
     tr: Sequence[float], td: Sequence[float], file: str | None
 ) -> Sequence[tuple[float, float]]:
-    """Return the windows from pairs of times or from a file; raise UsageError if there are none."""
+    """Return the windows from pairs of times or from a file; raise UsageError if the pairs are incomplete."""
     if file is not None:
         if tr or td:
             raise click.UsageError("--windows excludes --tr and --td")
         return options.read_windows_in(file)
-    if not tr or not td:
-        raise click.UsageError(
-            f"a card needs {'--td' if tr else '--tr'}; or --windows, a file with lines 'tr td'"
-        )
     if len(tr) != len(td):
         raise click.UsageError(
             f"{len(tr)} --tr and {len(td)} --td were given, a --td for each --tr was expected"

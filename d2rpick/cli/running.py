@@ -10,6 +10,7 @@ import click
 from d2rpick.base.errors import make_printable
 from d2rpick.base.options import NOT_NEGATIVE, POSITIVE, Option
 from d2rpick.cli import options
+from d2rpick.cli.missing import list_needs_of_drive, list_needs_of_first
 from d2rpick.cli.output import Output, encode_text, name_options_and_wrap, tell
 from d2rpick.cli.progress import show_progress
 from d2rpick.cli.values import choose_click_type
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
 CMD = ("program", "CMD")
 
 
-@options.make_command
+@options.make_command_with_needs(list_needs_of_drive)
 @click.argument("deck", type=choose_click_type("file"))
 @click.option(
     "-o", "folder", metavar="RUNDIR", required=True, type=choose_click_type("output"),
@@ -95,9 +96,9 @@ def drive(
     r"""Compute a Radioss run that needs no reference run, because d2rpick switches the parts as the run proceeds.
 
     DECK, a starter deck with one engine file, is copied into RUNDIR.  The parts are treated as flying when no force has
-    acted on them for the time --wait.  A rigid probe run then finds the next contact.  From one margin before this
-    contact, the run continues with deformable parts.  The result is reproducible: the same command gives the same run.
-    --resume continues an interrupted run.
+    acted on them for the time --wait.  A rigid probe run then finds the next contact.  The run then continues with
+    deformable parts from a time that is one margin before this contact.  The result is reproducible: the same command
+    gives the same run.  --resume continues an interrupted run.
 
     Examples
     --------
@@ -171,7 +172,7 @@ def _plan(driving: Driving) -> list[str]:
     is_flag=True,
     cls=options.Either,
     instead_of=("lasting",),
-    help="Report the present state, and end.",
+    help="Report the present state, and exit.",
 )
 @click.option(
     "--for", "lasting", type=choose_click_type(NOT_NEGATIVE), metavar="T", cls=options.Either, instead_of=("once",),
@@ -190,7 +191,7 @@ def follow(
     request: Request,
     output: Output,
 ) -> None:
-    """Watch RUN, files or a folder, while it is computed: report when the parts fly, and when to switch.
+    """Watch RUN (files or a folder) while the solver computes it, and report when the parts fly and when to switch.
 
     d2rpick prints a line for each event: load, flight with its evidence, recommended switch, contact, restart, silence,
     end.  RUN need not have started.  d2rpick does not start, stop or change anything.
@@ -263,7 +264,7 @@ def _exists(run: str) -> bool:
     return Path(run).exists() or bool(glob(run, recursive=True))  # noqa: PTH207  Path.glob needs the folder
 
 
-@options.make_command
+@options.make_command_with_needs(list_needs_of_first)
 @click.argument("deck", type=choose_click_type("file"))
 @options.make_click_option(
     "part",

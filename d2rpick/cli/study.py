@@ -23,7 +23,7 @@ from d2rpick.base.errors import (
 from d2rpick.base.options import UNLIMITED, Option
 from d2rpick.cli import options
 from d2rpick.cli.options import RESULT, WINDOW
-from d2rpick.cli.output import Output, tell
+from d2rpick.cli.output import Output, name_options, tell
 from d2rpick.cli.progress import show_counting
 from d2rpick.cli.values import choose_click_type
 from d2rpick.report.formats import FORMATS, RepeatedQuestion
@@ -145,7 +145,7 @@ def _finish_study(answer: Study, output: Output) -> None:
     """Exit with the code that the answer requires, after a message that explains the code."""
     if not answer.judged:
         tell(
-            f"d2rpick: no run could be judged; the first: {answer.runs[0].message or ''}"
+            f"d2rpick: no run could be judged; the first: {name_options(answer.runs[0].message or '')}"
         )
     if not answer.judged or any(row.status == INTERNAL_ERROR for row in answer.runs):
         click.get_current_context().exit(2)
@@ -256,8 +256,8 @@ def _choose_farm(
 def calibrate(folders: tuple[str, ...], output: Output) -> None:
     """Fit the cost of elements to the CPU times of your runs, for --weights.
 
-    Each RUN is the folder of one run, with its deck and the listings of its solver: NAME_0001.out with /MON/ON of
-    Radioss, d3hsp or glstat of LS-DYNA.  Give runs of the same model with and without switching.  If the runs
+    Each RUN is the folder of one run, with its deck and the listings of its solver: NAME_0001.out for Radioss (run with
+    /MON/ON), or d3hsp or glstat for LS-DYNA.  Give runs of the same model with and without switching.  If the runs
     cannot distinguish the costs of two formulations, their built-in ratio is kept.  A run that is named twice is used
     once.
 

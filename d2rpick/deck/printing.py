@@ -73,7 +73,7 @@ _SEPARATE = (
     "CHECK BEFORE USE: each part becomes a rigid body of its own (LRB 0). This is",
     "  wrong for parts that share nodes, and nothing shows here whether they do.",
     "  Give the main deck and a history of these parts (--deck), or merge such",
-    "  parts (d2rpick card --merge), never loose ones.",
+    "  parts (d2rpick card --merge). Do not merge loose parts.",
 )
 _RUN_NAME = re.compile(r"[\w.-]+", re.ASCII)
 _OF_RADIOSS = (
@@ -85,7 +85,7 @@ _OF_RADIOSS = (
     "A body that the first file does not deactivate is rigid from time 0.",
     "The starter takes the nodes of an /RBODY from every /RWALL; Ikrem 1 keeps",
     "  them there while the body is inactive.",
-    "An initial velocity must move the main node of a body too.",
+    "Define initial velocities for the main node of a body too.",
     "Repeat your output keywords (/TFILE, /ANIM, ...) in every file.",
 )
 _BY_FORCE = (
@@ -410,7 +410,7 @@ def _print_sensors(
     nodes = ", ".join(map(str, ids))
     instructions = (
         f"Each /RBODY with main node {nodes} takes sensor {last}: sens_ID, columns 11 to 20 below its title.",
-        f"/BEGIN needs version {STOPS_SINCE} or later, which knows when a sensor of time stops.",
+        f"/BEGIN needs version {STOPS_SINCE} or later: earlier versions have no Tstop of sensors.",
     )
     card = _combine_card(
         tuple(windows),

@@ -17,10 +17,13 @@ from d2rpick.flight.internal_energy import (
 )
 from d2rpick.flight.window import (
     SHORTEST,
+    explain_hole,
     find_all_windows,
     limit_to_unheld,
+    limit_to_written_states,
     list_marks,
 )
+from d2rpick.histories.samples import find_hole_around, find_holes
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -123,7 +126,9 @@ class Witness(NamedTuple):
 
     def around(self, moment: float) -> FreeFlight | None:
         """Return the flight around a time; each flight is searched for only once."""
-        return _search_once(self.history, self.source, moment, search=self.search)
+        return _search_once(
+            self.history, self.source, moment, search=self.search, time=self.time
+        )
 
     def flights(self) -> tuple[FreeFlight, ...]:
         """Return all flights in ascending order; they are searched for only once."""
@@ -143,14 +148,25 @@ class Witness(NamedTuple):
 
 @remember
 def _search_once(
-    _: History,
-    _source: str,
+    history: History,
+    source: str,
     moment: float,
     *,
     search: Callable[[float], FreeFlight | None],
+    time: Samples,
 ) -> FreeFlight | None:
     """Return the flight around a time according to one source of evidence in a history."""
-    return search(moment)
+    flight = search(moment)
+    holes = _list_holes(history, source, time=time)
+    return flight and limit_to_written_states(flight, holes, moment)
+
+
+@remember
+def _list_holes(
+    _: History, _source: str, *, time: Samples
+) -> tuple[tuple[float, float], ...]:
+    """Return the intervals without states of a source of evidence [time]."""
+    return find_holes(time)
 
 
 @remember
@@ -240,6 +256,9 @@ def _find_flight_by_evidence(history: History, td: float) -> Seen:
 
 def _explain_refusal(witness: Witness, td: float) -> str:
     """Return the reason why td [time] is not in a flight, even if the momentum alone shows a flight there."""
+    hole = find_hole_around(find_holes(witness.time), td)
+    if hole:
+        return explain_hole(hole, td)
     contradiction = witness.explain_contradiction(td)
     if contradiction:
         return contradiction

@@ -196,7 +196,7 @@ def refuse_foreign(source: str, head: bytes) -> None:
     if _is_deck(head):
         raise FormatError(
             f"{source}: this is a deck, an energy history was expected; "
-            "name the glstat, matsum, binout or T01 of its run"
+            "name the glstat, matsum, binout or T01 of its run, and this file as `deck`"
         )
     _refuse(source, head, _TEXT_FORMATS)
     if re.search(_DYNA_HEAD, head):

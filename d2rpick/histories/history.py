@@ -12,7 +12,7 @@ from d2rpick.base.errors import HistoryError, RangeError, list_names
 from d2rpick.base.memory import Memory, remember
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.histories.digits import format_distinctly
-from d2rpick.histories.samples import find_turns, find_window
+from d2rpick.histories.samples import find_holes, find_turns, find_window
 from d2rpick.histories.surroundings import UNKNOWN, Surroundings
 
 if TYPE_CHECKING:
@@ -394,6 +394,11 @@ class History:
     def step(self) -> float:
         """Largest output interval [time], which limits the vibration frequencies that the record resolves."""
         return float(np.max(np.diff(self.time)))
+
+    @cached_property
+    def holes(self) -> tuple[tuple[float, float], ...]:
+        """Intervals without states, such as those of a missing restart segment, in ascending order [time]."""
+        return find_holes(self.time)
 
     @property
     def turns(self) -> Samples:

@@ -44,7 +44,7 @@ _BEFORE: Final = (
 _SHORT: Final = 7  # Number of digits of an abbreviated commit hash.
 
 WITH_AN_ERROR: Final = "with an error"
-_PACKED: Final = "normally (its history is packed)"
+_PACKED: Final = "normally (its history is compressed)"
 # Texts at the end of Radioss' engine listing and of LS-DYNA's messag and d3hsp.
 _ENDINGS: Final = {
     b"ERROR TERMINATION": WITH_AN_ERROR,

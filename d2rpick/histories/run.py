@@ -43,6 +43,13 @@ from d2rpick.histories.table_parts import (
     find_springs_not_chosen,
     read_energies_of_parts_not_chosen,
 )
+from d2rpick.histories.wrong_values import (
+    Column,
+    check_balance,
+    check_internal_energy,
+    check_momenta,
+    has_lone_jump,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -142,6 +149,36 @@ class OpenedRun:
         return replace(
             history, evidence=evidence, surroundings=self.surroundings, notes=notes
         )
+
+    def check_energy(self, history: History) -> None:
+        """Raise HistoryError if a single internal energy of the ``history`` is wrong, as in a damaged file."""
+        if not has_lone_jump(history.energy):
+            return
+        if history.parts is None:
+            balance = history.balance
+            total = balance.kinetic_and_internal if balance else None
+            if balance is None or not np.array_equal(balance.time, history.time):
+                total = None
+            internal = Column(history.channel, history.time, history.energy)
+            check_internal_energy(internal, total, self.files)
+            return
+        total = give_if_written(self._compute_total_of_parts)
+        deforming = [part for part in history.parts if part not in history.springs]
+        for part, energy in zip(
+            deforming, self.part_energies(deforming).T, strict=True
+        ):
+            internal = Column(
+                f"internal energy of part {part.name}", self.part_time, energy
+            )
+            check_internal_energy(internal, total, self.files)
+
+    def _compute_total_of_parts(self) -> Samples:
+        """Return the sum of the internal and kinetic energies of all parts (n,) [energy], or raise FormatError."""
+        energies = (
+            self.part_energies(self.parts),
+            self.part_kinetic_energies(self.parts),
+        )
+        return np.asarray(np.sum(energies, axis=(0, 2)))
 
     def unused_energies(self, selection: Selection) -> tuple[str, ...]:
         """Return notes on table channels that look like energies but are neither selected nor recognised."""
@@ -519,7 +556,10 @@ class _Written(Given):
     @cached_property
     def momenta(self) -> tuple[Momenta, ...]:
         """Momenta of the parts, followed by that of the whole model."""
-        return self._run.momenta(self._chosen, self._flying)
+        found = self._run.momenta(self._chosen, self._flying)
+        for momenta in found:
+            check_momenta(momenta, self._run.files)
+        return found
 
     @cached_property
     def masses(self) -> Samples | None:
@@ -552,7 +592,10 @@ class _Written(Given):
         """Energies of the whole model."""
         from d2rpick.histories.balance import read_terms
 
-        return read_terms(self._run.databases)
+        balance = read_terms(self._run.databases)
+        if balance:
+            check_balance(balance, self._run.files)
+        return balance
 
     def displacements(self, ids: Sequence[int]) -> NodeMotion | None:
         """Return the displacements of the requested nodes that the files contain; None if they contain none of them."""

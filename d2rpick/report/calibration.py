@@ -27,7 +27,7 @@ _LEG: Final = row(
         lambda leg: leg.elements,
     ),
 )
-DOCUMENT: Final = Document("d2rpick/calibrate/1", "Answer of d2rpick calibrate; times in us per cycle.", row(
+DOCUMENT: Final = Document("d2rpick/calibrate/1", "Answer of d2rpick calibrate; times in µs per cycle.", row(
     keys.WARNINGS,
     Field("element_share", "number", "fraction of a time step of the deformable model that is spent on elements",
           lambda ours: ours.weights.element_share),

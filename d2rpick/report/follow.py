@@ -145,7 +145,7 @@ def _describe_flight(flight: SeenFlight) -> str:
     """Report that a flight was detected, which evidence shows it, and why it was not detected earlier."""
     landing = "landing time unknown"
     if flight.level is not None:
-        landing = f"landing at about {flight.level:.4g} if it lands as high as it took off, later if lower"
+        landing = f"landing at about {flight.level:.4g} if the ground is level, later if it slopes down"
     return (
         f"no force for {flight.seen - flight.start:.4g}, the required force-free time is {flight.wait.time:.4g} "
         f"({flight.wait.reason}); {flight.quantity} is constant within {flight.left:.1e} of its maximum; {landing}"

@@ -230,7 +230,9 @@ def _name_step_to_better_record(
         line = write_command(_allow_deck(question), "suggest", *words)
         without = _ADD_COLUMNS if history.format in ("csv", "hdf5") else ""
         return f"judge the run with its deck: {line}{deck.hint}{without}"
-    return f"improve the record: {decision.cure}; no pair of it can be used before"
+    return (
+        f"improve the record: {decision.cure}; until then, no pair from it can be used"
+    )
 
 
 def add_step_to_copy(
@@ -478,4 +480,4 @@ def name_step_after_first(folder: str) -> str:
     files = make_positional([folder])
     check = quote_shell_line(("d2rpick", "check", *files))
     follow = quote_shell_line(("d2rpick", "follow", *files))
-    return f"check the deck with {check}, and run it; {follow} shows meanwhile when the parts fly and are rigid"
+    return f"check the deck with {check}, and run it; meanwhile, {follow} shows when the parts fly or are rigid"

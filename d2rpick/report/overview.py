@@ -13,10 +13,6 @@ from d2rpick.histories.source import find_unread_legs
 from d2rpick.report import keys, tables
 from d2rpick.report.fields import Document, Field, get_kind, many, maybe, one_of, row
 from d2rpick.report.formats import RepeatedQuestion
-from d2rpick.report.next_step import (
-    ask_for_states_that_show_flight,
-    name_step_after_switched_run,
-)
 from d2rpick.report.situation import (
     list_health_columns,
     list_health_measures,
@@ -104,8 +100,8 @@ _PARTS_HEAD = ("part", "title", "highest internal energy")
 # Whether times can be chosen from the record. The verdict on a pair uses similar words, so the sentence names the
 # record, and leaves the verdict on its windows to `plan`.
 _RECORD: Final = {
-    USE: "can be used to choose times: it has flights, and d2rpick plan judges their windows",
-    USE_WITH_CARE: "can be used with care to choose times: it has flights, and d2rpick plan judges their windows",
+    USE: "can be used to choose times: it has flights, and d2rpick plan judges the windows in them",
+    USE_WITH_CARE: "can be used with care to choose times: it has flights, and d2rpick plan judges the windows in them",
     DO_NOT_USE: "do not use it to choose times",
 }
 _NOT_JUDGED: Final = (
@@ -173,6 +169,9 @@ def list_overview_lines(overview: Overview) -> list[tuple[str, str]]:
     if overview.verdict == DO_NOT_USE:
         is_known = overview.unjudged or overview.rigid
         if overview.rigid and not overview.unjudged:
+            # Imported here to keep start-up fast.
+            from d2rpick.report.next_step import name_step_after_switched_run
+
             question = RepeatedQuestion(files=overview.source)
             return [*lines, ("next", name_step_after_switched_run(question))]
         if is_known:
@@ -211,6 +210,9 @@ def _ask_for_states(overview: Overview) -> str:
         or overview.time_end is None
     ):
         return ""
+    # Imported here to keep start-up fast.
+    from d2rpick.report.next_step import ask_for_states_that_show_flight
+
     return ask_for_states_that_show_flight(
         overview.states, overview.time_start, overview.time_end
     )

@@ -76,7 +76,7 @@ def list_situation_heading(
         ("basis", f"{_describe_basis(situation)}{f': {why}' if why else ''}"),
     ]
     if rests_on_assumed_parts(situation.history):
-        assumed = f"the energy is {ASSUMED_PARTS}; the table does not name its parts"
+        assumed = f"d2rpick assumes {ASSUMED_PARTS}; the table does not name its parts"
         lines.insert(1, ("assumes", assumed))
     if flight.start is None:
         lines.append(("flight", "unknown"))

@@ -107,9 +107,9 @@ _SHARED: Final = row(
           lambda answer: answer.spread or dict.fromkeys(_EXTENTS)),
     Field("agree", "flag?", "true if the intervals from tr_low to tr_high of these runs overlap"),
     Field("common_tr", "number?",
-          "median of tr, or the time nearest to it within all intervals, if the runs agree. Otherwise the earliest tr "
-          "that is admissible in every run with status ok or none, and within the timing tolerance of each, if there "
-          "is such a tr", lambda answer: answer.common.tr),
+          "if the runs agree, the median of tr, or the nearest time that lies in all intervals; otherwise the "
+          "earliest tr that is admissible in every run with status ok or none, and within the timing tolerance of "
+          "each of them; null if there is none", lambda answer: answer.common.tr),
     Field("common_verdict", maybe(keys.VERDICT),
           "what to do with common_tr: the verdict for the worst run, from its own pair and from its error at "
           "common_tr",
@@ -367,7 +367,7 @@ def _count_verdicts(answer: StudyOfRuns) -> str:
     return ", ".join(
         [
             *counted,
-            *[f"no pair in {format_number_of_runs(undecided_count)}"]
+            *[f"no verdict in {format_number_of_runs(undecided_count)}"]
             * (undecided_count > 0),
         ]
     )

@@ -85,7 +85,7 @@ def _make_elements(keyword: str) -> Example:
     ]
 )
 @make_rule_decorator(
-    "D2R001", ERROR, "the rows after a card do not match its D2R/R2D counts"
+    "D2R001", ERROR, "the lines after a card do not match its D2R and R2D counts"
 )
 def _check_counts(case: Case) -> Iterator[PlacedMessage]:
     """The second line of *DEFORMABLE_TO_RIGID_AUTOMATIC gives the number of D2R lines (D2R) and of R2D lines (R2D) that
@@ -311,7 +311,8 @@ def _check_truncation(case: Case) -> Iterator[PlacedMessage]:
     without *END whose last lines are nodes or elements may be truncated too. The last number may be incomplete, and
     switching cards, parts or parameters may be missing. d2rpick parts computes no cost from a truncated mesh.
 
-    Fix: Copy or write the file again. If the file is complete, add *END (Radioss: /END) or a line end.
+    Fix: Copy or write the file again. If the file is complete, add *END (Radioss: /END), or end the last line with a
+    line break.
     """
     for block, problem in find_cuts(case.deck):
         yield (
@@ -463,9 +464,9 @@ def _report_inertias(case: Case) -> Iterator[PlacedMessage]:
     "switching cards on standard input without parts: ids are not checked",
 )
 def _report_missing_parts(case: Case) -> Iterator[PlacedMessage]:
-    """A file that contains only switching cards is meant to be included by another deck, and is checked with it. Cards
-    from standard input, as in d2rpick card ... | d2rpick check -, come without a deck, so d2rpick cannot check that
-    their parts exist.
+    """A file that contains only switching cards is meant to be included in another deck, and d2rpick checks it together
+    with that deck. Cards from standard input, as in d2rpick card ... | d2rpick check -, come without a deck, so d2rpick
+    cannot check that their parts exist.
 
     Fix: Paste the cards into the deck, or include them there, and check the main deck.
     """

@@ -382,10 +382,16 @@ class ModalVibration:
     ) -> tuple[Samples, Samples, Samples]:
         """Return the residual of each tr (n,) with its lower and upper bound [-].
 
-        Squares are not negative: if the band reaches below zero, the middle of its remainder replaces ``stated``.
+        Squares are not negative: if the band reaches below zero, the middle of its remainder replaces ``stated``.  If
+        two close modes explain the record as well, the residual is at least that of the close modes, because a single
+        line hides how far they are out of phase.
         """
         off, below, above = self._compute_errors(tr, td)
-        return measures.band_about(np.square(stated), off, above, below)
+        residual, low, high = measures.band_about(np.square(stated), off, above, below)
+        if self.with_close_modes is not None:
+            of_close_modes = self.with_close_modes.residual_squared(tr, td)
+            residual = np.clip(np.sqrt(of_close_modes), residual, high)
+        return residual, low, high
 
     def unseen(self, tr: Samples | float, td: float) -> Samples:
         """Return the vibration energy fraction that a hidden mode needs at td to explain the error band of each tr [-].

@@ -48,9 +48,11 @@ _BEYOND_CHOICE: Final = 6.0
 # Largest frequency difference between a line of the first part and the same line of the record [cycles over record].
 _SAME_LINE: Final = 0.5
 # Decay exponents over the record that are tried in the search for lines in a misfit [-].
-_DECAYS: Final = (0.0, 2.0, 6.0)
-# Largest exponent by which an added line may decay over the record; a faster decay would fit a few states of a load.
-_MOST_DECAY: Final = 8.0
+_DECAYS: Final = (0.0, 2.0, 6.0, 18.0)
+# A faster decay than that of the following limits would fit a few states of a load.
+# _MOST_DECAY: largest exponent by which an added line may decay over the record.
+# _FEWEST_CYCLES: smallest number of cycles in which a line that decays faster may fall by a factor of e.
+_MOST_DECAY, _FEWEST_CYCLES = 8.0, 4.0
 # Largest number of lines that are added because the misfit contains them.
 _MOST_OF_REST: Final = 3
 # Number of points per cycle over the record at which the spectrum of a misfit is evaluated.
@@ -168,8 +170,15 @@ def _add_line(grid: Grid, spectrum: Spectrum, pole: complex) -> Spectrum | None:
     extended = _refine_spectrum(grid, fit_weights(grid, poles, spectrum.mean.poles))
     needed = _get_needed_gain(grid) + _BEYOND_CHOICE
     is_needed = _compute_gain(spectrum, extended) > needed
-    is_lasting = -extended.lines.poles[-1].real * grid.span < _MOST_DECAY
+    is_lasting = _lasts(complex(extended.lines.poles[-1]), grid.span)
     return extended if is_needed and is_lasting else None
+
+
+def _lasts(pole: complex, span: float) -> bool:
+    """Return True if a line decays so slowly that it cannot describe the end of a load in the record."""
+    decay = -pole.real
+    has_many_cycles = pole.imag > 2 * np.pi * _FEWEST_CYCLES * decay
+    return decay * span < _MOST_DECAY or has_many_cycles
 
 
 def _remove_needless_lines(grid: Grid, spectrum: Spectrum) -> Spectrum:

@@ -67,7 +67,7 @@ FILES = {
         ["no column 'internal_enrg'", "did you mean 'internal_energy'"]
     ),
     "column zero": (tabulate(math.cos), ("--energy", "0"), ["no column '0'", "1 'time'"]),
-    "energy is the time": (tabulate(math.cos), ("--energy", "time"), ["input: ", "choose another one as energy"]),
+    "energy is the time": (tabulate(math.cos), ("--energy", "time"), ["input: ", "choose another one"]),
     "td after the record": (tabulate(math.cos), ("--td", "7"), ["input: ", "--td 7 lies outside the record, 0 to 1"]),
     "after outside": (tabulate(math.cos), ("--after", "7"), ["input: --after 7 lies outside the record, 0 to 1"]),
     "window outside": (tabulate(math.cos), ("--fit-window", "0", "7"), ["--fit-window 0 7 reaches outside the record"]),

@@ -335,7 +335,7 @@ def test_a_card_says_whose_level_it_is_and_names_many_parts_by_sets() -> None:
 
 def test_options_of_a_card_belong_to_a_card() -> None:
     assert (
-        "is about the card"
+        "is an option of the card"
         in run("suggest", "--td", "0.0687534", ENERGY, "--merge", "11").stderr
     )
 

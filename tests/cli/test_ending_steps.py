@@ -62,7 +62,7 @@ def test_info_leaves_the_verdict_on_the_windows_to_plan() -> None:
     for history in (ENERGY, MATSUM):
         record = list_first_lines("info", history)["record"]
         assert record.startswith("can be used")
-        assert record.endswith("d2rpick plan judges their windows")
+        assert record.endswith("d2rpick plan judges the windows in them")
 
 
 # A run that was switched already.

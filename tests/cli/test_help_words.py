@@ -115,7 +115,8 @@ def test_no_help_shows_an_expression_of_python() -> None:
         assert re.search(r"\{(?!(?:deck|threads)\})", text) is None, name
     helps = dict(list_options())
     assert (
-        "reference_m, published_m, better_m, or z_m, y_m" in helps["reproduce --solver"]
+        "either reference_m, published_m and better_m, or z_m"
+        in helps["reproduce --solver"]
     )
 
 

@@ -55,7 +55,7 @@ COMMANDS: Final = {
     "no column ...; there are:": ("suggest", "--energy", "absent", ENERGY),
     "needs --deck": ("plan", "--part", "recommended", MATSUM),
     "No such option": ("suggest", "--tolerence", "0.1", ENERGY),
-    "a card for LS-DYNA needs --part": ("card", "--tr", "0.1", "--td", "0.3"),
+    "missing: --part IDS": ("card", "--tr", "0.1", "--td", "0.3"),
 }  # fmt: skip
 
 

@@ -149,12 +149,12 @@ def test_the_table_names_what_it_rests_on_and_marks_the_recommended_row() -> Non
     lines = run(*SUGGEST, ENERGY).stdout.splitlines()
     assert lines[:4] == [
         "do not use  tr = 0.0128853, td = 0.064",
-        "why         the vibration after td is wrong by 96%, since 92% of its energy is kinetic at td, which",
-        "            no tr can keep",
-        "to improve  use tr = 0.0135867, td = 0.0687534: vibration wrong by 0.0%",
+        "why         the vibration after td is wrong by 96%, since 92% of its energy is kinetic at td, and no",
+        "            tr can keep kinetic energy",
+        "to improve  use tr = 0.0135867, td = 0.0687534: vibration error 0.0%",
     ]
     assert lines[4].startswith(
-        "expect      mean energy after td 8% of the reference run, vibration wrong by 96% (residual 0.957)"
+        "expect      mean energy after td 8% of the reference run, vibration error 96% (residual 0.957)"
     )
     assert "motion     good" in lines
     assert "rigid for  0.0511147, 34% of the simulated time" in lines

@@ -184,6 +184,14 @@ def test_a_value_of_the_wrong_type_is_refused_with_what_was_expected(
 
 
 @pytest.mark.usefixtures("here")
+def test_a_key_of_any_length_is_named_in_a_short_message() -> None:
+    put(Path("d2rpick.toml"), f"{'x' * 10_000} = 1\n")
+    refusal = read_refusal("suggest", ENERGY)
+    assert f"d2rpick.toml:1: unknown key '{'x' * 59} ..., one of " in refusal
+    assert "xxx" not in refusal.partition(" ..., ")[2]
+
+
+@pytest.mark.usefixtures("here")
 def test_a_command_is_set_by_a_table() -> None:
     put(Path("d2rpick.toml"), "suggest = 1979-05-27\n")
     assert "suggest is 1979-05-27, a table was expected" in read_refusal(*ASKED)

@@ -246,7 +246,7 @@ def test_a_better_pair_is_named_alike_even_if_its_residual_is_large(td: str) -> 
     (studied,) = run_json("study", "--td", td, *question)["runs"]
     cure = suggested["cure"]
     assert cure.startswith("use tr = ")
-    assert cure.endswith(": vibration wrong by 60%")
+    assert cure.endswith(": vibration error 60%")
     assert judged["cure"] == cure
     assert studied["cure"] == cure
     assert f"to improve {cure}" in join_wrapped_lines(explored)

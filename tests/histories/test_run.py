@@ -434,7 +434,8 @@ def test_packed_data_that_ends_early_is_read_as_far_as_it_goes(
 def test_a_long_gap_between_legs_is_told() -> None:
     legs = [locate_stored(f"rollover_r100_{leg}.gz") for leg in ("T01", "T03")]
     assert any(
-        "no states between 0.0999564 and 0.370008" in note
+        "no states between 0.0999564 and 0.370008: a restart segment may be missing"
+        in note
         for note in open_run(legs).history(Selection()).notes
     )
 

@@ -39,7 +39,7 @@ TOLD = {
     ),
     "the saving, and no pair that is not better": (
         ("suggest", "--td", "0.13505", "--part", "spring1,spring2", "--cost-share", "0.9", CHAIN), 0,
-        ("about 16% of the CPU time", "wrong by 8.0%"), ("Better pair", "Parts at this pair"),
+        ("about 16% of the CPU time", "error of 8.0%"), ("Better pair", "Parts at this pair"),
     ),
     "nothing to recommend": (
         ("suggest", "--td", "0.064", "--max-residual", "0.1", ENERGY), 1,

@@ -130,7 +130,7 @@ def test_the_check_says_that_it_does_not_know_these_times(tmp_path: Path) -> Non
         (
             CONTACT,
             {"parts": None},
-            r"deactivates no rigid body \(/RBODY/OFF\); name those to be switched with `parts`",
+            r"missing: `parts` \(parts to switch; .* deactivates no rigid body \(/RBODY/OFF\)",
         ),
     ],
 )
@@ -152,7 +152,7 @@ def test_a_deck_without_known_springs_asks_for_the_wait(tmp_path: Path) -> None:
     Path(main).write_text(
         Path(main).read_text().replace("/PROP/SPRING/", "/PROP/SPR_GENE/")
     )
-    with pytest.raises(ValueError, match=r"`wait` cannot be derived from"):
+    with pytest.raises(ValueError, match=r"missing: `wait` \(force-free time"):
         d2.first(main, tmp_path / "next", parts=(1, 2))
     assert (
         d2.first(main, tmp_path / "next", parts=(1, 2), wait=0.01).reason == "as given"

@@ -54,8 +54,12 @@ def test_modes_that_get_out_of_phase_are_in_the_band(
     assert np.sqrt(np.mean((squared - true**2) ** 2)) < 0.05
     as_one_line = modal.reading.residual_squared(*PAIRS)
     assert np.mean((as_one_line - true**2) ** 2) > 2 * np.mean((squared - true**2) ** 2)
-    _, low, high = modal.residual_band(compute_residuals(modal, *PAIRS), *PAIRS)
+    stated, low, high = modal.residual_band(compute_residuals(modal, *PAIRS), *PAIRS)
     assert np.mean((true > low - 1e-3) & (true < high + 1e-3)) > 0.95
+    assert np.all(stated >= np.sqrt(squared) - 1e-9)
+    assert np.all(stated <= high)
+    # Even if one line hides how far the modes are out of phase, no small residual is stated for a large one.
+    assert not np.any((stated < 0.25) & (true > 0.3))
 
 
 @pytest.mark.parametrize("static", [0.0, 0.05, 0.3, 3.0])

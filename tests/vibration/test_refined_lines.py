@@ -47,6 +47,25 @@ def test_a_line_that_dies_early_is_found_although_noise_outlasts_it(
     assert measure_rate_errors(refined, structure).max() < 0.05
 
 
+@pytest.mark.parametrize("seed", [0, 5])
+def test_a_line_that_dies_within_a_tenth_of_the_record_is_found_if_it_has_many_cycles(
+    seed: int,
+) -> None:
+    # The line of the last mode falls by a factor of e in 12 cycles, and 9 times as long is recorded.
+    structure = LinearStructure(
+        np.array([0.37, 1.0, 0.4, 0.5]),
+        np.array([0.03, 0.18, 0.24, 0.49]),
+        np.array([9.06, 21.9, 25.2, 36.2]),
+        np.array([0.3, 1.0, 2.0, 0.5]),
+    )
+    energy = structure.elastic_energy(TIME)
+    normal = np.random.default_rng(seed).standard_normal(TIME.size)
+    grid, prediction = predict_record(energy + NOISE * np.ptp(energy) * normal)
+    assert measure_rate_errors(prediction, structure).max() > 1.0
+    refined = refine_prediction(grid, prediction)
+    assert measure_rate_errors(refined, structure).max() < 0.2
+
+
 def test_the_first_part_keeps_two_lines_that_hardly_part_in_it() -> None:
     # The two lines of the energy are half a cycle apart over the record.
     time = TIME[::4]

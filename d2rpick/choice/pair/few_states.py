@@ -8,6 +8,7 @@ import numpy as np
 
 from d2rpick.base.errors import Caution, list_names
 from d2rpick.histories.formats import FAMILIES
+from d2rpick.histories.samples import changes_at_random
 from d2rpick.vibration.identify import MIN_SAMPLES_PER_PERIOD
 
 if TYPE_CHECKING:
@@ -32,13 +33,16 @@ def warn_about_few_states(situation: Situation) -> Iterator[Caution]:
     if history.energy_format not in FAMILIES or situation.at_rest:
         return
     begin = history.start if start is None else start
-    states = history.between(begin, td)[0].size
+    _, energy = history.between(begin, td)
+    states = energy.size
     turns = int(np.count_nonzero((history.turns > begin) & (history.turns < td)))
     if (
         turns >= _TURNS_PER_PERIOD
         and states * _TURNS_PER_PERIOD >= MIN_SAMPLES_PER_PERIOD * turns
     ):
         return
+    if changes_at_random(energy):
+        return  # The grade of the vibration blames the noise.
     oftener = list_names([name for name in _OFTENER if name != history.energy_format])
     text = (
         f"{states} states of the {history.energy_format} up to td = {td:.6g} are too few to show how the "

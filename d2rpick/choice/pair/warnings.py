@@ -318,7 +318,13 @@ def describe_end_of_load(situation: Situation) -> str:
 
 def describe_end_of_flight(situation: Situation) -> str:
     """Describe ``latest_td`` in words: the end of the flight, minus the margin if there is one."""
-    return f"the end of the flight at {situation.flight.end:.6g}{_describe_margin(situation.margin)}"
+    end = situation.flight.end
+    cause = ""
+    if any(start == end for start, _ in situation.history.holes):
+        cause = ", where the states stop (is a restart segment missing?)"
+    return (
+        f"the end of the flight at {end:.6g}{cause}{_describe_margin(situation.margin)}"
+    )
 
 
 def _describe_margin(margin: float | None) -> str:
@@ -689,6 +695,11 @@ def _describe_in_load(situation: Situation) -> str:
     """State that a tr lies before the flight, or that no flight is known."""
     if situation.earliest_tr is None:
         return situation.flight.refusal or "unknown: no end of the load is found"
+    start = situation.flight.start
+    if any(end == start for _, end in situation.history.holes):
+        return (
+            f"tr before the states go on at {start:.6g} (is a restart segment missing?)"
+        )
     return f"tr before {describe_end_of_load(situation)}"
 
 

@@ -326,7 +326,7 @@ class Table(Database):
         if not labels:
             article = "the" if column == self._time else "a"
             raise FormatError(
-                f"{self.source}: {wanted!r} is {article} time column; choose another one as energy"
+                f"{self.source}: {wanted!r} is {article} time column; choose another one"
             )
         return labels[0]
 
