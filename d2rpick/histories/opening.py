@@ -20,6 +20,7 @@ from d2rpick.histories.source import (
     Source,
     find_unread_legs,
     list_tables_of_folder,
+    list_unread_databases,
     open_files,
 )
 
@@ -103,7 +104,11 @@ def open_run(
     """
     sources = open_files(names)
     files = [source.name for source in sources]
-    notes = (*_note_unused_tables(names), *_note_unread_legs(files))
+    notes = (
+        *_note_unused_tables(names),
+        *_note_unread_databases(names, files),
+        *_note_unread_legs(files),
+    )
     return open_sources(sources, selection, input_format, notes)
 
 
@@ -118,6 +123,21 @@ def _note_unused_tables(names: Sequence[str]) -> tuple[str, ...]:
     return (
         f"{listed} were left out: tables next to databases of the solver; name one to use it",
     )
+
+
+def _note_unread_databases(
+    names: Sequence[str], files: Sequence[str]
+) -> tuple[str, ...]:
+    """Return a note on files in the named folders whose names resemble those of databases, but that were not read."""
+    unread = [file for name in names for file in list_unread_databases(name, files)]
+    if not unread:
+        return ()
+    listed = list_names(unread, most=_MOST_TABLES)
+    if len(unread) == 1:
+        note = f"{listed} was not read, because the solver gives no file this name; if it belongs to the run"
+    else:
+        note = f"{listed} were not read, because the solver gives no files these names; if they belong to the run"
+    return (f"{note}, give all files by name",)
 
 
 def _note_unread_legs(files: Sequence[str]) -> tuple[str, ...]:
@@ -421,9 +441,45 @@ def _has_model_and_parts(legs: Sequence[Database]) -> bool:
 
 def _refuse_unknown_channels(databases: Sequence[Legs], selection: Selection) -> None:
     """Raise FormatError if no database has a channel that the user names for a quantity."""
+    with_channels = [database for database in databases if database.channels]
     for quantity, name in selection.channels:
-        if not any(quantity in database.quantities for database in databases):
-            databases[0].find(name)
+        if any(_has_channel(database, name) for database in with_channels):
+            continue
+        option = f"`channels` {quantity}={name}"
+        expected = "the name of a column was expected"
+        if quantity == "mass" and _is_number(name):
+            expected += ", not a value (`mass` takes that of the oscillator model)"
+        if not with_channels:
+            sources = ", ".join(database.source for database in databases)
+            raise FormatError(
+                f"{sources}: {option}: {expected}, and there are only columns of parts"
+            )
+        database = with_channels[0]
+        try:
+            database.find(name)
+        except FormatError as error:
+            problem = str(error).removeprefix(f"{database.source}: ")
+            raise FormatError(
+                f"{database.source}: {option}: {expected}; {problem}"
+            ) from None
+
+
+def _has_channel(database: Legs, name: str) -> bool:
+    """Return True if a name or number selects a channel of a database."""
+    try:
+        database.find(name)
+    except FormatError:
+        return False
+    return True
+
+
+def _is_number(text: str) -> bool:
+    """Return True if a text is a number."""
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
 
 
 def _refuse_time_of_solver(kinds: Sequence[str], time: str | None) -> None:
