@@ -46,16 +46,16 @@ def collect_objections(
     card: PrintedCard,
     deck: str | None,
     parts: int,
-    lead: int | None,
-    parts_of_run: Sequence[Part] = (),
+    lead: int | None = None,
+    known_parts: Sequence[Part] = (),
 ) -> Iterator[Caution]:
     """Yield the findings of ``check`` for the deck with the card or, without a deck, warnings about what is unknown.
 
-    ``parts`` is the number of parts that the card switches by their ids, and ``lead`` the part into which they are
-    merged.
+    ``parts`` is the number of parts that the card switches by their ids, ``lead`` the part into which they are merged,
+    and ``known_parts`` are the parts of the history.
     """
     if deck is None:
-        yield from warn_about_lead(lead, (), parts_of_run)
+        yield from warn_about_lead(lead, (), known_parts)
         if parts > 1:
             message = "without a deck of the run it is unknown whether these parts share nodes"
             yield Caution(

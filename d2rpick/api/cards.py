@@ -87,7 +87,7 @@ def explain_unknown_solver(name: object) -> str:
 
     solvers = list_solvers()
     near = suggest_name(str(name), solvers)
-    return f"{name!r} was found{near}, one of {', '.join(solvers)} was expected"
+    return f"{name!r} was found{near}, but one of {', '.join(solvers)} was expected"
 
 
 @dataclass(eq=False, repr=False)
@@ -311,8 +311,13 @@ def name_needed_argument(solver: Module) -> str:
     return f"a card for {solver.title} needs {arguments_by_kind[solver.switches]}"
 
 
-def parse_id_ranges(name: str, texts: Sequence[str]) -> list[int]:
-    """Return the ids given as numbers and ranges. Without a history, all ids in a range are assumed to exist."""
+def parse_id_ranges(
+    name: str, texts: Sequence[str], *, takes_history: bool = True
+) -> list[int]:
+    """Return the ids given as numbers and ranges. Without a history, all ids in a range are assumed to exist.
+
+    Messages name the option --history only if the command ``takes_history``.
+    """
     ids: list[int] = []
     for piece in (piece.strip() for text in texts for piece in text.split(",")):
         match = re.fullmatch(_RANGE, piece, re.ASCII)
@@ -323,8 +328,10 @@ def parse_id_ranges(name: str, texts: Sequence[str]) -> list[int]:
                 )
             if piece.isdecimal():
                 hint = "; an id has at most 10 digits"
-            elif name == "--part":
+            elif name == "--part" and takes_history:
                 hint = "; titles need a --history that has parts"
+            elif name == "--part":
+                hint = "; give the ids of parts in the deck"
             else:
                 hint = ""
             raise ArgumentError(
@@ -334,11 +341,15 @@ def parse_id_ranges(name: str, texts: Sequence[str]) -> list[int]:
         high = int(match[2] or match[1])
         if low == 0:
             raise ArgumentError(
-                f"{name}: {piece!r} does not fit, ids from 1 were expected; give those that the deck lists"
+                f"{name}: {piece!r} does not fit, but ids from 1 were expected; give those that the deck lists"
             )
-        if not low <= high < low + _MOST_IDS:
+        if high < low:
             raise ArgumentError(
-                f"{name}: {piece!r} is not a range of 1 to {_MOST_IDS} numbers"
+                f"{name}: the range {piece!r} is reversed; give the smaller number first, {high}-{low}"
+            )
+        if not high < low + _MOST_IDS:
+            raise ArgumentError(
+                f"{name}: {piece!r} holds more than {_MOST_IDS} numbers; give shorter ranges"
             )
         ids += range(low, high + 1)
     return ids

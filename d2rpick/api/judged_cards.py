@@ -116,10 +116,12 @@ def judge_and_print(
     card, verdicts = result
     card = replace(card, notes=(*notes, *card.notes))
     apart = _count_separate_parts(printing)
-    objections = collect_objections(
-        card, question.deck, apart, printing.merge, reference.run.parts
+    cautions = tuple(
+        collect_objections(
+            card, question.deck, apart, printing.merge, reference.run.parts
+        )
     )
-    return JudgedCard(card, verdicts, tuple(objections))
+    return JudgedCard(card, verdicts, cautions)
 
 
 def _count_separate_parts(printing: Printing) -> int:
@@ -216,9 +218,16 @@ def card(
 
 
 def print_card(
-    windows: Sequence[Times], run: Run | None, request: Request, cards: Cards
+    windows: Sequence[Times],
+    run: Run | None,
+    request: Request,
+    cards: Cards,
+    listed_in: str = "",
 ) -> JudgedCard:
-    """Print the card for windows. If a run is given, judge the printed times with it."""
+    """Print the card for windows. If a run is given, judge the printed times with it.
+
+    Messages on times in another unit name the file that the windows are ``listed_in``.
+    """
     from d2rpick.deck.printing import SOLVERS, find_solver, print_cards
 
     if run is None:
@@ -233,12 +242,21 @@ def print_card(
     from d2rpick.api.asked import ask_run  # Imported here to keep start-up fast.
 
     question = ask_run(run, request, card_alone=True)
+    for tr, td in windows:
+        question.reference.history.check_pair(tr, td, listed_in)
     solver = cards.solver or find_solver(question.reference.history.format)
     cards.check_solver(solver)
     parts = parse_id_ranges("--part", question.on_card)
     if parts and SOLVERS[solver].switches != "part":
         raise ArgumentError(_ONLY_JUDGED.format(SOLVERS[solver].title))
     return judge_and_print(question, cards, windows)
+
+
+def _refuse_history_as_deck(name: str) -> None:
+    """Raise DeckError if a file that was given as a deck is a history."""
+    from d2rpick.deck.source import SourceFile  # Imported here to keep start-up fast.
+
+    SourceFile(name).refuse_history()
 
 
 def _print_in_deck(
@@ -270,9 +288,7 @@ def _print_in_deck(
     cautions = (
         *warn_about_bodies(parts, inventory),
         *warn_about_solver(parts, inventory),
-        *collect_objections(
-            card, deck, _count_separate_parts(printing), printing.merge
-        ),
+        *collect_objections(card, deck, _count_separate_parts(printing)),
     )
     return JudgedCard(card, (), cautions)
 
@@ -289,13 +305,6 @@ def _require_switched(printing: Printing, cards: Cards) -> None:
         raise ArgumentError(name_needed_argument(module))
     if "end" in module.takes and printing.end is None:
         raise ArgumentError(_NEEDS_END.format(module.title))
-
-
-def _refuse_history_as_deck(name: str) -> None:
-    """Raise DeckError if a file that was given as a deck is a history."""
-    from d2rpick.deck.source import SourceFile  # Imported here to keep start-up fast.
-
-    SourceFile(name).refuse_history()
 
 
 def _complete_alone(request: Request, cards: Cards) -> Printing:

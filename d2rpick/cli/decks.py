@@ -74,7 +74,7 @@ def card(
     times = _read_windows(tr, td, windows)
     run = options.open_judging_run(request)
     output = output.beside(windows, *(run.sources if run else ()))
-    judged_card = print_card(times, run, request, cards)
+    judged_card = print_card(times, run, request, cards, windows or "")
     question = request.repeat()
     if judged_card.verdicts:
         history = judged_card.verdicts[0].situation.history
@@ -99,7 +99,7 @@ def _read_windows(
         return options.read_windows_in(file)
     if len(tr) != len(td):
         raise click.UsageError(
-            f"{len(tr)} --tr and {len(td)} --td were given, a --td for each --tr was expected"
+            f"{len(tr)} --tr and {len(td)} --td were given, but a --td for each --tr was expected"
         )
     return list(zip(tr, td, strict=True))
 

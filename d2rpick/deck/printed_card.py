@@ -195,9 +195,13 @@ def refuse_overlapping_windows(windows: Sequence[Times]) -> tuple[Times, ...]:
     for tr, td in windows:
         if tr == td:
             raise DeckError(f"tr and td are both {tr:g}; give a td after tr")
-        if not 0 <= tr < td < math.inf:
+        if tr < 0:
             raise DeckError(
-                f"tr is {tr:g} and td is {td:g}, 0 <= tr < td was expected; give the earlier time as tr"
+                f"tr = {tr:g} lies before the start of the run; give a tr from 0"
+            )
+        if not tr < td < math.inf:
+            raise DeckError(
+                f"tr is {tr:g} and td is {td:g}, but tr < td was expected; give the earlier time as tr"
             )
     for (tr, td), (later, end) in pairwise(windows):
         if not later > td:
