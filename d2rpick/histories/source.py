@@ -37,23 +37,9 @@ _HEAD_OF_TABLE: Final = 4096
 # Name that contains that of a database with energies, such as matsum01 or glstat.old.
 _LIKE_DATABASE: Final = r"(?i:.*(?:glstat|matsum|binout|d3thdt).*)"
 # Suffixes of results, figures, programs and decks, which are no history even if they are named after one.
-_OTHER_SUFFIXES: Final = tuple(
-    [
-        ".csv",
-        ".html",
-        ".json",
-        ".k",
-        ".key",
-        ".md",
-        ".ndjson",
-        ".pdf",
-        ".png",
-        ".py",
-        ".rad",
-        ".sh",
-        ".svg",
-        ".toml",
-    ]
+_OTHER_SUFFIXES: Final = (
+    *(".csv", ".html", ".json", ".k", ".key", ".md", ".ndjson"),
+    *(".pdf", ".png", ".py", ".rad", ".sh", ".svg", ".toml"),
 )
 # Beginning of an address on the network, such as https://.
 _ADDRESS: Final = re.compile(r"[a-z]+://", re.IGNORECASE)
