@@ -170,7 +170,9 @@ def open_source(name: str) -> Source:
 
 def _report_empty(name: str) -> FormatError:
     """Return the error for an empty file."""
-    return FormatError(f"{name}: the file is empty; has the run been started?")
+    return FormatError(
+        f"{name}: the file is empty, states were expected; wait until the run has written some, or give another file"
+    )
 
 
 def _list_files(name: str) -> Sequence[str]:

@@ -19,7 +19,7 @@ from tests.made_t01 import MadePart, make_t01
 from tests.reading import read_history
 from tests.text_files import make_glstat_text
 
-CSV = b"time,internal_energy\n0.0,1.0\n0.1,2.0\n0.2,1.5\n"
+CSV = b"first,second\n0.0,1.0\n0.1,2.0\n0.2,1.5\n"
 GLSTAT = (
     b" title\n                         ls-dyna smp.123264 s           date 01/12/2018\n\n\n"
     b" dt of cycle       1 is controlled by dt2ms     \n\n"
