@@ -1,7 +1,8 @@
 """The indexes of the frequently asked questions: each question with a link, and the bold text of its answer.
 
-``python -m tests.questions`` writes them to docs/how-to/faq.md (planning a switch), model-faq.md (the model) and
-switched-faq.md (cards, switched run and CI), so that each can be scanned at a glance; a test holds them current.
+``python -m tests.questions`` writes them to docs/how-to: start-faq.md (first steps), files-faq.md (files of a run),
+faq.md (planning), model-faq.md (the model), switched-faq.md (cards and switched run) and scripts-faq.md (scripts, CI,
+many runs), so that each can be scanned at a glance; a test holds them current.
 """
 
 from __future__ import annotations
@@ -16,27 +17,47 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 FOLDER: Final = ROOT / "docs" / "how-to"
+_PREFIX: Final = "Frequently asked questions: "
 # Titles of the indexes, and labels of their pages, in the order of the lists.
 INDEXES: Final = {
-    "faq": "Frequently asked questions: planning a switch",
-    "model-faq": "Frequently asked questions: your model",
-    "switched-faq": "Frequently asked questions: cards, switched run and CI",
+    "start-faq": f"{_PREFIX}installation and first steps",
+    "files-faq": f"{_PREFIX}the files of a run",
+    "faq": f"{_PREFIX}planning a switch",
+    "model-faq": f"{_PREFIX}your model",
+    "switched-faq": f"{_PREFIX}cards and switched run",
+    "scripts-faq": f"{_PREFIX}scripts, CI, many runs",
 }
 PAGES: Final = {
-    "faq": {
+    "start-faq": {
         "faq-start": "Start",
+        "faq-work": "Use at work",
+    },
+    "files-faq": {
         "faq-files": "Files",
+        "faq-formats": "Formats",
+        "faq-reading": "Reading the run",
+    },
+    "faq": {
         "faq-answer": "Answer",
+        "faq-terms": "Terms",
         "faq-times": "Times",
+        "faq-saving": "Saving",
     },
     "model-faq": {
         "faq-models": "Model",
+        "faq-options": "Solver options and loads",
         "faq-special": "Special cases",
     },
     "switched-faq": {
         "faq-solver": "Cards",
+        "faq-constraints": "Constraints",
+        "faq-rigid": "While rigid",
         "faq-run": "Switched run",
-        "faq-scripts": "Scripts",
+    },
+    "scripts-faq": {
+        "faq-scripts": "Scripts and CI",
+        "faq-output": "Output",
+        "faq-many": "Many runs, first runs",
     },
 }
 
@@ -87,13 +108,11 @@ def make_index(index: str) -> str:
     ]
     lines = [f"# {INDEXES[index]}", "", _INTRODUCTION, ""]
     for page, label in PAGES[index].items():
-        lines.append(f"* **{label}.** {', '.join(_link_topics(page, ''))}")
+        lines.append(f"* **{label}.** {', '.join(_link_topics(page))}")
     others = [
-        link
-        for other in INDEXES
+        f"[{title.removeprefix(_PREFIX)}]({other}.md)"
+        for other, title in INDEXES.items()
         if other != index
-        for page in PAGES[other]
-        for link in _link_topics(page, f"{other}.md")
     ]
     lines.append(f"* **Other lists.** {', '.join(others)}")
     topic = ""
@@ -107,12 +126,12 @@ def make_index(index: str) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _link_topics(page: str, file: str) -> list[str]:
-    """Return links to the topics of a page, whose questions are listed in the index ``file``."""
+def _link_topics(page: str) -> list[str]:
+    """Return links to the topics of a page within the index that lists its questions."""
     topics = dict.fromkeys(
         question.topic for question in list_questions() if question.page == page
     )
-    return [f"[{topic}]({file}#{make_anchor(topic)})" for topic in topics]
+    return [f"[{topic}](#{make_anchor(topic)})" for topic in topics]
 
 
 if __name__ == "__main__":

@@ -25,8 +25,8 @@ SCHEMAS: Final = ROOT / "d2rpick" / "schemas"
 
 _RULES_INTRODUCTION: Final = (
     "This page explains what each rule of `d2rpick check` finds, and how to fix the problem. `d2rpick rule D2R105` "
-    "prints the same text, with example decks that pass and fail. [Check decks](../how-to/check-decks.md) explains how "
-    "to select and silence rules, and how to change their severity."
+    "prints the same text, and `d2rpick rule -v D2R105` adds example decks that pass and fail. [Check "
+    "decks](../how-to/check-decks.md) explains how to select and silence rules, and how to change their severity."
 )
 _WARNINGS_INTRODUCTION: Final = (
     "This page explains each warning: what happened, what it means for the result, and what to do. "

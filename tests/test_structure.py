@@ -16,7 +16,7 @@ import pytest
 
 from d2rpick.api import models
 from d2rpick.report.history_files import OSCILLATOR_WRITERS
-from tests.command import DECK, ENERGY, GLSTAT, ROOT, TIME_LIMIT
+from tests.command import DECK, ENERGY, GLSTAT, MATSUM, ROOT, TIME_LIMIT
 
 PACKAGE = ROOT / "d2rpick"
 
@@ -81,6 +81,7 @@ UNNEEDED = {
     ),
 }
 SUGGEST = ("suggest", "--exit-zero", "--quiet", "--td")  # -q costs click difflib
+BOX_HDF5 = str(ROOT / "sample_data" / "rollover_box.h5")
 CARD = ("card", "--tr", "0.02", "--td", "0.09")
 # The result of each command with JSON output, and the version of its schema.
 SCHEMAS = [
@@ -287,7 +288,7 @@ def list_loaded(*args: str) -> frozenset[str]:
     """Return the modules that a call of the program has loaded when it ends."""
     compile_package()
     code = (
-        "import atexit, sys; atexit.register(lambda: print(*sys.modules, file=sys.stderr));"
+        "import os, sys; os._exit = lambda _: print(*sys.modules, file=sys.stderr);"
         "from d2rpick.__main__ import main; main()"
     )
     result = subprocess.run(
@@ -334,6 +335,8 @@ def compute_share(modules: frozenset[str]) -> float:
             ((*SUGGEST, "0.064", file), "click, numpy", 0.37)
             for file in (ENERGY, GLSTAT)
         ),
+        (("info", MATSUM), "click, numpy", 0.26),
+        (("info", BOX_HDF5), "click, numpy, h5py", 0.26),
     ],
 )
 def test_a_command_loads_only_what_its_answer_needs(
@@ -397,12 +400,27 @@ def test_the_package_alone_imports_nothing() -> None:
     }
 
 
-def test_no_garbage_is_looked_for_at_the_end() -> None:
+def test_objects_are_not_deleted_at_the_end() -> None:
+    """What libraries have registered for the end is done, and the exit code is that of the command."""
     code = (
-        "import atexit, gc, sys; atexit.register(lambda: print(len(gc.get_objects()) < gc.get_freeze_count()));"
-        "sys.argv = ['d2rpick', '--help']; from d2rpick.__main__ import main; main()"
+        "import atexit, sys; import d2rpick.cli as cli\n"
+        "class Kept:\n"
+        "    def __del__(self): print('deleted')\n"
+        "cli.kept = Kept()\n"
+        "atexit.register(print, 'skipped')\n"
+        "parse = cli._CommandGroup.parse_args\n"
+        "cli._CommandGroup.parse_args = lambda *a: (atexit.register(print, 'done'), parse(*a))[1]\n"
+        "sys.argv = ['d2rpick', 'nothing']; from d2rpick.__main__ import main; main()"
     )
-    assert run_code(code).splitlines()[-1] == "True"
+    result = subprocess.run(
+        [sys.executable, "-c", code],
+        check=False,
+        capture_output=True,
+        text=True,
+        cwd=ROOT,
+        timeout=TIME_LIMIT,
+    )
+    assert (result.returncode, result.stdout) == (2, "done\n"), result.stderr
 
 
 def test_the_command_line_offers_the_formats_of_models_there_are() -> None:

@@ -8,10 +8,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from d2rpick.api import arguments
 from d2rpick.api.deck_in_folder import find_deck_in_folder, name_deck
 from d2rpick.api.request import OPTIONS, Request
-from d2rpick.api.times import TimeArguments
 from d2rpick.base.errors import (
     ArgumentError,
     Caution,
@@ -26,7 +24,7 @@ from d2rpick.histories.names import Selection, has_recommended
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from d2rpick.api.arguments import Parts
+    from d2rpick.api.arguments import Deck, Parts, Path
     from d2rpick.api.choosing import Choosing
     from d2rpick.api.runs import Run
     from d2rpick.choice.parts.cost import CostModel, Weights
@@ -95,14 +93,18 @@ def make_request(
     run: Run | None,
     parts: Parts | None,
     flying: Parts | None,
-    deck: arguments.Deck | None,
-    weights: Weights | arguments.Path | None,
+    deck: Deck | None,
+    weights: Weights | Path | None,
     choosing: Choosing,
 ) -> Request:
     """Make a request from the arguments; raise TypeError for a wrong type or an unknown argument.
 
     Times in ``choosing`` may be strings with a unit, which are converted to the unit of the run.
     """
+    # Imported here to keep start-up fast.
+    from d2rpick.api import arguments
+    from d2rpick.api.times import TimeArguments
+
     if run is not None:
         arguments.check_run("run", run)
     chosen = run.chosen if run else Selection()

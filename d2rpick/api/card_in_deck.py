@@ -4,27 +4,59 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from d2rpick.base.errors import Caution, DeckError
+from d2rpick.base.errors import Caution, DeckError, list_names
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
-    from d2rpick.api.asked import RunQuestion
     from d2rpick.deck.printed_card import PrintedCard
+    from d2rpick.histories.names import Part
 
 OBJECTION: Final = "card-objection"
 ERROR_OF_CARD: Final = "card-error"
 UNJOINED: Final = "parts-not-joined"
+UNKNOWN_LEAD: Final = "lead-part-unknown"
+# Largest number of parts that are named in a warning.
+_MOST_NAMES: Final = 5
+
+
+def warn_about_lead(
+    lead: int | None,
+    switched_parts: Sequence[int],
+    known_parts: Sequence[Part] | None = None,
+) -> Iterator[Caution]:
+    """Yield a warning if nothing shows that the lead part of a card without a deck exists.
+
+    ``known_parts`` are the parts of the history; None if there is no history.
+    """
+    known_ids = {part.id for part in known_parts or ()}
+    if lead is None or lead in {*switched_parts, *known_ids}:
+        return
+    problem = f"`merge` {lead}: nothing shows that the model has a part {lead}"
+    if known_parts:
+        names = list_names([part.name for part in known_parts], most=_MOST_NAMES)
+        problem = f"`merge` {lead}: the history has no part {lead}, only {names}"
+    addition = " with a `history`" if known_parts is None else ""
+    yield Caution(
+        UNKNOWN_LEAD,
+        f"{problem}; give a part of the model as `merge`, or the main deck as `deck`{addition} to check the card",
+    )
 
 
 def collect_objections(
-    card: PrintedCard, question: RunQuestion, parts: int
+    card: PrintedCard,
+    deck: str | None,
+    parts: int,
+    lead: int | None = None,
+    known_parts: Sequence[Part] | None = None,
 ) -> Iterator[Caution]:
-    """Yield the findings of ``check`` for the deck with the card or, without a deck, a warning about shared nodes.
+    """Yield the findings of ``check`` for the deck with the card or, without a deck, warnings about what is unknown.
 
-    ``parts`` is the number of parts that the card switches by their ids.
+    ``parts`` is the number of parts that the card switches by their ids, ``lead`` the part into which they are merged,
+    and ``known_parts`` are the parts of the history.
     """
-    if question.deck is None:
+    if deck is None:
+        yield from warn_about_lead(lead, (), known_parts)
         if parts > 1:
             message = "without a deck of the run it is unknown whether these parts share nodes"
             yield Caution(
@@ -40,7 +72,7 @@ def collect_objections(
 
     with TemporaryDirectory() as folder:
         try:
-            checked = check_deck(write_deck(question.deck, card, folder)[0])
+            checked = check_deck(write_deck(deck, card, folder)[0])
         except DeckError as error:
             yield Caution(
                 ERROR_OF_CARD, f"the card does not fit into the deck: {error}"

@@ -18,11 +18,11 @@ class JudgingOptions(TypedDict, total=False):
 
     ``after``: end of the load (default: found from the record).  ``landing``: time of the next contact after the
     flight; td lies at least one margin before it (default: found from the record).  ``margin``: time kept free after
-    the load and before the next contact (default: after the load 0; before the contact derived, if d2rpick chooses td
-    or ``landing`` is given).  ``tolerance``: largest frozen-deformation error, or level error with the basis energy;
-    no effect with the basis modal (default: 0.2).  ``max_kinetic_share``: reject a td with a larger kinetic fraction.
-    ``max_residual``: reject a pair with a larger residual.  ``min_quality``: lowest grade that is not reported as a
-    problem (exit code 1) (default: fair).
+    the load and before the next contact (default: 0 after the load; before the contact derived from flight and
+    vibration, but only if d2rpick chooses td or you give ``landing``).  ``tolerance``: largest frozen-deformation
+    error, or level error with the basis energy; no effect with the basis modal (default: 0.2).  ``max_kinetic_share``:
+    reject a td with a larger kinetic fraction.  ``max_residual``: reject a pair with a larger residual.
+    ``min_quality``: lowest grade that is not reported as a problem (exit code 1) (default: fair).
     """
 
     after: float | str | None
@@ -41,7 +41,7 @@ class Choosing(JudgingOptions, total=False):
     shows when the load ends (default: False).  ``keep_vibration``: grade the vibration by the residual alone, even if
     the next contact has far more energy (default: False).  ``cost_share``: fraction of the CPU time of a time step
     that is saved while the parts are rigid, to predict the saving.  ``step_ratio``: time step while the parts are
-    rigid, divided by the time step before, 1 or more (default: 1).  ``oscillator``: given instead of identified, with
+    rigid, divided by the time step before; at least 1 (default: 1).  ``oscillator``: given instead of identified, with
     ``v0``.  ``v0``: velocity of the frame of ``oscillator`` at time 0.  ``replay``: False: judge by the energy level
     alone, without an oscillator (default: True).
     """

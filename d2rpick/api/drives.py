@@ -81,7 +81,7 @@ class Driving:
         self.name, self.folder, self._report = deck, folder, report
         self.commands = Commands(starter, engine, threads)
         self.deck = read_driven_deck(
-            deck, parse_id_ranges("--part", part) if part else ()
+            deck, parse_id_ranges("--part", part, takes_history=False) if part else ()
         )
         self.inventory = read_inventory(deck)
         if wait is not None:
@@ -123,6 +123,11 @@ class Driving:
             journal = Journal(folder / JOURNAL)
             digest = hashlib.sha256(b"\0".join(self.deck.files.values())).hexdigest()
             begun = journal.records[:1]
+            if resume and not begun:
+                raise D2RPickError(
+                    f"{folder}: there is no run to resume in this folder; give the folder of the run, or leave out "
+                    "--resume to begin one"
+                )
             computed = journal.has("ended")
             if computed and not resume:
                 raise D2RPickError(
@@ -132,12 +137,8 @@ class Driving:
                 raise D2RPickError(
                     f"{folder}: this run was begun with another deck than {self.name} is now; give that deck"
                 )
-            if not begun and any(
-                not file.name.startswith(".") for file in folder.iterdir()
-            ):
-                raise D2RPickError(
-                    f"{folder}: the folder is not empty; choose another one"
-                )
+            if not begun:
+                self.refuse_other_files()
             if not computed:  # The user may have corrected the deck or the command.
                 journal.path.unlink(missing_ok=True)
                 journal = Journal(journal.path)
@@ -157,6 +158,14 @@ class Driving:
                 raise D2RPickError(
                     f"{folder}: {error.strerror}; make room, then --resume"
                 ) from None
+
+    def refuse_other_files(self) -> None:
+        """Raise D2RPickError if the folder of the run exists and contains files, but no run that was begun."""
+        folder = self.folder
+        if not folder.is_dir() or (folder / JOURNAL).exists():
+            return
+        if any(not file.name.startswith(".") for file in folder.iterdir()):
+            raise D2RPickError(f"{folder}: the folder is not empty; choose another one")
 
     def answer(self, driver: Driver, command: Sequence[str]) -> Drive:
         """Return the result for the part of the run that has been computed."""

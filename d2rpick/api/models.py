@@ -89,7 +89,7 @@ class Motion:
     td: float | None = make_option(
         "Switch back to deformable at this time.", NOT_NEGATIVE, "T"
     )
-    t_end: float = make_option("Last time.", POSITIVE, "T")
+    t_end: float = make_option("End of the computed run.", POSITIVE, "T")
     dt: float = make_option("Output interval.", POSITIVE, "T")
     write_as: str | None = make_option(
         "Format of the result.  [default: suffix of -o, else csv]", HISTORIES
@@ -115,10 +115,23 @@ class Motion:
             raise ArgumentError("give --tr and --td together")
         if self.tr is not None and self.td is not None and not self.tr < self.td:
             raise ArgumentError(f"--tr {self.tr:g} is not before --td {self.td:g}")
+        _check_interval(self.dt, self.t_end)
         if self.t_end / self.dt > MOST_REPLAYED:
             raise ArgumentError(
                 f"--t-end {self.t_end:g} holds more than {MOST_REPLAYED} intervals of --dt {self.dt:g}"
             )
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """A note on a release that lies after the end of the result."""
+        if self.td is None or self.td <= self.t_end:
+            return ()
+        return (
+            (
+                f"--td {self.td:g} lies after --t-end {self.t_end:g}, so the result ends before the release; "
+                "give a later --t-end"
+            ),
+        )
 
     @property
     def start(self) -> State:
@@ -190,11 +203,11 @@ class Box:
         "Number of processes of a scan.  [default: one per core]", range(1, UNLIMITED)
     )
     t_end: float | None = make_option(
-        "Last time.  [default: 0.42, with --drop 1.2]", POSITIVE, "T"
+        "End of the run.  [default: 0.42; if --drop is given, 1.2]", POSITIVE, "T"
     )
     dt: float = make_option("Output interval.", POSITIVE, "T", default=1e-4)
     speed: float | None = make_option(
-        "Speed of the sled at the start, or of a falling box along x, m/s.  [default: 7, with --drop 0]",
+        "Speed of the sled at the start, or of a falling box along x, in m/s.  [default: 7; if --drop is given, 0]",
         NOT_NEGATIVE,
     )
     stiffness: float | None = make_option(
@@ -233,9 +246,8 @@ class Box:
         else:
             _check_windows(self.tr, self.td, self.end)
         if self.tilt is not None and self.drop is None:
-            raise ArgumentError(
-                "--tilt belongs to --drop; the floor of the sled keeps its own"
-            )
+            raise ArgumentError("--tilt needs --drop: it is the tilt of a falling box")
+        _check_interval(self.dt, self.end)
         if self.end / self.dt > MOST_STATES:
             raise ArgumentError(
                 f"--t-end {self.end:g} holds more than {MOST_STATES} intervals of --dt {self.dt:g}"
@@ -279,6 +291,14 @@ class Box:
         from d2rpick.models.box_run import simulate
 
         return simulate(self.parameters, self.end, *rigid, interval=self.dt)
+
+
+def _check_interval(dt: float, t_end: float) -> None:
+    """Raise ArgumentError if the output interval is longer than the run, which would give a single state."""
+    if dt > t_end:
+        raise ArgumentError(
+            f"--dt {dt:g} is longer than the run, --t-end {t_end:g}; give a shorter --dt"
+        )
 
 
 def _check_windows(
@@ -345,7 +365,7 @@ def warn_if_unbalanced(record: Record) -> tuple[Caution, ...]:
     imbalance = float(abs(record.imbalance).max())
     if imbalance <= BALANCED:
         return ()
-    message = f"the energy is balanced within {imbalance:.2g} of the largest total, {BALANCED} was expected"
+    message = f"the energy is balanced within {imbalance:.2g} of the largest total, but {BALANCED} was expected"
     return (
         Caution(
             "energy-balance",

@@ -78,7 +78,7 @@ def first(
     >>> d2.first("sample_data/rollover_box.k", "first", parts=1)  # doctest: +ELLIPSIS
     Traceback (most recent call last):
     ...
-    d2rpick.base.errors.ArgumentError: `wait` cannot be derived from sample_data/rollover_box.k (no masses...)...
+    d2rpick.base.errors.ArgumentError: sample_data/rollover_box.k: missing: `wait` (force-free time...)
     """
     from d2rpick.deck.writing import write_deck
     from d2rpick.running.first import first_card

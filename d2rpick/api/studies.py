@@ -19,7 +19,7 @@ from d2rpick.api.answer import Paged, build_frame
 from d2rpick.api.asked import make_request
 from d2rpick.api.request import OPTIONS, Request, choose_time_or_window
 from d2rpick.api.times import TimeArguments, find_common_unit
-from d2rpick.base.errors import INTERNAL_ERROR, FormatError
+from d2rpick.base.errors import INTERNAL_ERROR, ArgumentError, FormatError
 from d2rpick.base.files import add_checksum, append_as_a_whole, parse_record
 from d2rpick.base.workers import Farm, choose_farm
 from d2rpick.choice.runs import study as core
@@ -31,6 +31,7 @@ from d2rpick.choice.runs.study import (
     StudyRow,
     stamp_files,
 )
+from d2rpick.histories.names import has_recommended
 from d2rpick.report.study import PLAIN, RUN
 from d2rpick.report.tables import make_positional
 
@@ -47,6 +48,8 @@ if TYPE_CHECKING:
 _FIRST: Final = b'{"source": '
 # First bytes of the summary line, which follows the rows.
 _LAST: Final = b'{"schema": '
+# Fields of a row that JSON stores as arrays.
+_LISTS: Final = ("warnings", "parts")
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -183,7 +186,19 @@ def _remove_repeated(names: Iterable[str]) -> list[str]:
 def make_question(
     request: Request, td: float | tuple[float, float] | None, *, curve: bool
 ) -> Question:
-    """Return the question to ask about every run; ``curve`` is True if the energies of all runs are drawn."""
+    """Return the question to ask about every run; ``curve`` is True if the energies of all runs are drawn.
+
+    Raises
+    ------
+    ArgumentError
+        If the recommended set is requested, which depends on the deck of each run: one tr suits all runs only if all of
+        them switch the same parts.
+    """
+    if has_recommended(request.part, ()):
+        raise ArgumentError(
+            "`parts` recommended needs a deck, but the runs of a study share one set of parts; find a set with d2rpick "
+            "parts, and give its numbers"
+        )
     return Question(
         td, request.settings, request.selection(), request.input_format, curve=curve
     )
@@ -334,11 +349,13 @@ class Ledger:
     def _remember(self, record: dict[str, Any]) -> None:
         files = tuple(Stamp(**stamp) for stamp in record["files"])
         self._known.add(tuple(stamp.name for stamp in files))
-        whole = "profile" in record and ("curve" in record or not self.curve)
+        needed = {*PLAIN.keys, "profile", *(["curve"] if self.curve else [])}
+        whole = needed <= record.keys()
         if record["asked"] == self.asked and files and whole:
             self._rows[files] = StudyRow(
-                **{name: record[name] for name in PLAIN.keys if name != "warnings"},
+                **{name: record[name] for name in PLAIN.keys if name not in _LISTS},
                 warnings=tuple(record["warnings"]),
+                parts=None if record["parts"] is None else tuple(record["parts"]),
                 acceptable=np.array(record["acceptable"][0]).reshape(-1, 2),
                 alike=np.array(record["acceptable"][1]).reshape(-1, 2),
                 profile=None

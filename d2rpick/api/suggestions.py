@@ -338,7 +338,10 @@ def judge_pair(
     tr_is_read = tr is None
     windows: tuple[SwitchedWindow, ...] = ()
     if switched_reference:
-        from d2rpick.choice.switched.same_model import refuse_other_model
+        from d2rpick.choice.switched.same_model import (
+            explain_difference,
+            refuse_other_model,
+        )
         from d2rpick.choice.switched.switch_times import (
             find_switched_windows,
             read_switch_times,
@@ -350,7 +353,14 @@ def judge_pair(
         windows = find_switched_windows(switched_reference, history)
         refuse_exchanged_runs(question.reference, switched_reference, windows)
         if tr is None or td is None:
-            tr, td = read_switch_times(switched_reference, history, windows, tr, td)
+            explain = partial(
+                explain_difference,
+                question.reference.run,
+                switched_reference.run,
+            )
+            tr, td = read_switch_times(
+                switched_reference, history, windows, tr, td, explain
+            )
     assert tr is not None
     assert td is not None
     result = answers.verify_run(question.reference, tr, td, question.settings)

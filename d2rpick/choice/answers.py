@@ -26,22 +26,26 @@ from d2rpick.choice.pair.decision import (
     CHECK_SWITCHED_RUN,
     CHOOSE_ANOTHER,
     GIVE_END_OF_LOAD,
+    GIVE_SWITCHED_RUN_OF_MODEL,
     Decision,
     decide,
 )
 from d2rpick.choice.pair.grades import GOOD, POOR
 from d2rpick.choice.pair.quality import (
     EQUALLY_GOOD,
+    MOST_GOOD,
     ROUNDING,
     Quality,
     list_exceeded_limits,
     rank_candidates,
+    trust_measured_momentum,
 )
 from d2rpick.choice.pair.situation import AnswerAtTd, Situation, examine_td
 from d2rpick.choice.pair.warnings import (
     POOR_KINETIC_SHARE,
     POOR_RESIDUAL,
     Expectation,
+    describe_end_of_load,
     estimate_time_after,
     find_largest_energy,
     list_objections_to_td,
@@ -53,7 +57,7 @@ from d2rpick.histories.balance import read_balance
 from d2rpick.histories.digits import round_as_read
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from d2rpick.choice.health import Health
     from d2rpick.choice.question import Reference, Settings
@@ -104,13 +108,18 @@ class PairVerdict(AnswerAtTd):
         decision = self._decide(None)
         if decision.grade == POOR:
             decision = self._decide(self.better)
-        if self._is_refuted:
+            if self.better is not None:
+                others = tuple(self._list_other_pairs(self.better))
+                decision = decision._replace(other_pairs=others)
+        if self._is_refuted or self.is_of_other_run:
             return decision
         return compare_in_flight(decision, self.situation, self.candidate)
 
     @property
     def _cure_of_objections(self) -> str:
         """Advice on a pair that is not admissible."""
+        if self.is_of_other_run:
+            return GIVE_SWITCHED_RUN_OF_MODEL
         if self._is_refuted:
             return CHECK_SWITCHED_RUN
         flight = self.situation.flight
@@ -137,7 +146,13 @@ class PairVerdict(AnswerAtTd):
         from d2rpick.choice.pair.cures import omit_comparison
 
         quality = omit_comparison(decision.quality)
-        return decision._replace(quality=quality, is_compared=True)
+        grade = decision.grade
+        is_momentum_equal = self.switched.momentum_error is not None
+        if is_momentum_equal and not self.switched.objections:
+            quality = trust_measured_momentum(quality)
+            is_refused = decision.objections or self.errors
+            grade = POOR if is_refused else quality.grade
+        return decision._replace(grade=grade, quality=quality, is_compared=True)
 
     @cached_property
     def _best_residual(self) -> float | None:
@@ -151,13 +166,30 @@ class PairVerdict(AnswerAtTd):
     @cached_property
     def better(self) -> Pair | None:
         """A better pair with a grade other than "poor": that of ``suggest`` for this td, or what it names as better."""
-        if self._is_refuted:
+        if self._is_refuted or self.is_of_other_run:
             return None
         good = self._good_pair
         if good is None or good.td != self.situation.td:
             return good
         decision = decide_with_better_pair(self._suggestion)
         return decision.better if decision and decision.better else good
+
+    def _list_other_pairs(self, better: Pair) -> Iterator[tuple[str, Pair]]:
+        """Yield the best pair at this td, and that of the flight if its residual is clearly smaller.
+
+        ``better`` is the pair that the verdict names first: the nearest good one, which may need another td.
+        """
+        good = self._good_pair
+        if good is not None and good.td == self.td != better.td:
+            yield "with the given td", good
+        if better.residual is None or better.residual <= MOST_GOOD:
+            return
+        choice = _choose_in_flight(self.situation)
+        best = choice.recommended if choice else None
+        if best is None or best.residual is None or best == better:
+            return
+        if better.residual - best.residual > EQUALLY_GOOD:
+            yield "best in the flight", best
 
     @cached_property
     def _suggestion(self) -> PairSuggestion:
@@ -168,6 +200,11 @@ class PairVerdict(AnswerAtTd):
     def _good_pair(self) -> Pair | None:
         """The pair recommended from the reference run alone, even if a finished switched run is known."""
         return find_good_pair(self._suggestion)
+
+    @property
+    def is_of_other_run(self) -> bool:
+        """True if the switched run differs from the reference run although neither was rigid yet."""
+        return self.switched is not None and self.switched.is_of_other_run
 
     @property
     def _is_refuted(self) -> bool:
@@ -212,6 +249,7 @@ def verify_in_history(
         If a time lies outside the record, or tr is not before td.
     """
     _check_order(tr, td)
+    history.check_pair(tr, td)
     if earlier and td == earlier.td:
         return verify_at(earlier, tr)
     situation = examine_td(history, td, settings)
@@ -683,6 +721,8 @@ def _explain_why_none(situation: Situation, ranked: Candidates) -> str:
         )
     if not (situation.history.parts or situation.history.energy.any()):
         return "the energy is 0 in all states, so nothing deforms; choose the internal energy with `energy`"
+    if situation.td <= situation.history.start:
+        return f"td = {situation.td:.6g} is the start of the record, so no time before it can be tr; give a later td"
     if not ranked:
         level = situation.energy_td
         return (
@@ -692,6 +732,11 @@ def _explain_why_none(situation: Situation, ranked: Candidates) -> str:
     if situation.td > situation.latest_td:
         reasons = "; ".join(list_objections_to_td(situation)).removeprefix("td ")
         return f"td = {situation.td:.6g} lies {reasons}"
+    flight = situation.flight
+    if flight.start is not None and situation.td <= flight.start:
+        where = f"td = {situation.td:.6g} lies before {describe_end_of_load(situation)}"
+        end = "" if flight.end is None else f", and at most {flight.end:.6g}"
+        return f"{where}; choose a later td{end}"
     nearest = ranked[0]
     exceeded = list_exceeded_limits(situation, nearest)
     reasons = "; ".join((*nearest.notes, *(excess.message for excess in exceeded)))
@@ -735,21 +780,32 @@ def suggest_in_run(
         answer = suggest_at(situation, with_better=with_better)
         if with_better:
             answer = _add_choice_in_flight(answer)
-    refuse_switched_flight(reference, answer.situation)
+    of_switched_run = refuse_switched_flight(reference, answer.situation)
+    answer = replace(answer, cautions=(*of_switched_run, *answer.cautions))
     return _add_health(answer, reference.run)
 
 
-def refuse_switched_flight(reference: Reference, situation: Situation) -> None:
-    """Raise RangeError if the parts, or some of them, were rigid in the flight up to td."""
+def refuse_switched_flight(
+    reference: Reference, situation: Situation
+) -> tuple[Caution, ...]:
+    """Raise RangeError if the parts, or some of them, were rigid in the flight up to td.
+
+    The result is a warning if they were rigid before the flight, or if the energy of one part seems to be frozen.
+    """
     # Imported here to keep start-up fast.
     from d2rpick.choice.switched.frozen import refuse_switched
 
     start, td = situation.flight.start, situation.td
     refuse_switched(situation.history, start, td)
-    if reference.run.parts:
-        from d2rpick.choice.switched.switched_run import refuse_partly_rigid
+    if not reference.run.parts:
+        return ()
+    from d2rpick.choice.switched.switched_run import (
+        refuse_partly_rigid,
+        warn_about_switched_run,
+    )
 
-        refuse_partly_rigid(reference, start, td)
+    windows = refuse_partly_rigid(reference, start, td)
+    return tuple(warn_about_switched_run(reference, windows, td))
 
 
 def _add_choice_in_flight(answer: PairSuggestion) -> PairSuggestion:
@@ -779,7 +835,8 @@ def verify_run(
     """Judge one pair (tr, td) of a reference run; see `verify_in_history` for ``earlier`` and the errors raised."""
     refuse_unsound(reference.history, settings, td, choosing=False)
     verdict = verify_in_history(reference.history, tr, td, settings, earlier)
-    refuse_switched_flight(reference, verdict.situation)
+    of_switched_run = refuse_switched_flight(reference, verdict.situation)
+    verdict = replace(verdict, cautions=(*of_switched_run, *verdict.cautions))
     return _add_health(verdict, reference.run)
 
 

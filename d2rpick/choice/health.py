@@ -371,7 +371,7 @@ def list_flaws(history: History) -> Iterator[Caution]:
     if highest > LARGEST_ENERGY:
         yield Caution(
             "energy-too-large",
-            f"energies up to {highest:g}, at most {LARGEST_ENERGY:g} was expected; write them in a larger unit",
+            f"energies up to {highest:g}, but at most {LARGEST_ENERGY:g} was expected; write them in a larger unit",
         )
         return
     reason = _describe_divergence(history)
@@ -404,7 +404,7 @@ def _describe_divergence(history: History) -> str | None:
         np.concatenate([[0.0], np.maximum.accumulate(energies)])[earlier]
         for energies in (kinetic + internal, internal)
     )
-    gained = counted & (deformed > 0) & (kinetic > _GAIN * earlier_energy)
+    gained = counted & (deformed > 0) & (kinetic / _GAIN > earlier_energy)
     # The factors are applied as divisors, because products of energies might overflow.
     gained &= (kinetic / _SPEED > internal) & (internal / _TORN > deformed)
     if balance.external_work is not None:

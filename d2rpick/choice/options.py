@@ -115,8 +115,8 @@ class ChoiceOptions:
         metadata=_describe_use(of_cards=True),
     )
     margin: float | None = make_option(
-        "Time kept free after the load and before the next contact.  [default: after the load 0; before the "
-        "contact derived, if d2rpick chooses td or `landing` is given]",
+        "Time kept free after the load and before the next contact.  [default: 0 after the load; before the contact "
+        "derived from flight and vibration, but only if d2rpick chooses td or you give `landing`]",
         NOT_NEGATIVE,
         "T",
         metadata=_describe_use(of_cards=True),
@@ -177,7 +177,7 @@ class ChoiceOptions:
     )
     # Rigid elements do not limit the time step, so the step cannot be smaller than that of the deformable run.
     step_ratio: float | None = make_option(
-        "Time step while the parts are rigid, divided by the time step before, 1 or more.  [default: 1]",
+        "Time step while the parts are rigid, divided by the time step before; at least 1.  [default: 1]",
         AT_LEAST_ONE,
         "N",
         metadata=_describe_use(of_sets=False, is_advanced=True),

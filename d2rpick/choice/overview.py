@@ -27,8 +27,7 @@ from d2rpick.choice.health import (
     warn_about_health,
 )
 from d2rpick.choice.pair.grades import DO_NOT_USE, USE, USE_WITH_CARE
-from d2rpick.choice.pair.situation import FEWEST_STATES
-from d2rpick.choice.question import Reference, Settings
+from d2rpick.choice.question import FEWEST_STATES, Reference, Settings
 from d2rpick.choice.switched.frozen import find_frozen_times
 from d2rpick.choice.switched.switched_run import (
     find_rigid_times,
@@ -94,6 +93,7 @@ class Overview(NamedTuple):
     the output that would show the flights of single parts; None if it is written, or there is no state.  ``deck`` is
     the main deck of the run that was used, and ``selection`` the columns and parts that the user chose.  ``rigid`` are
     the windows in which parts are rigid.  ``never_flies`` is True if the momentum shows no flight at any time.
+    ``holes`` are the intervals without states [time].
     """
 
     source: tuple[str, ...]
@@ -120,6 +120,7 @@ class Overview(NamedTuple):
     rigid: tuple[Times, ...] = ()
     never_flies: bool = False
     energies: tuple[str, ...] = ()
+    holes: tuple[Times, ...] = ()
 
     @property
     def verdict(self) -> str:
@@ -135,7 +136,7 @@ class Overview(NamedTuple):
             return "; ".join(caution.message for caution in self.unjudged)
         if not self.flights and self.states is not None and self.states < FEWEST_STATES:
             states = f"{self.states} state{'s' * (self.states != 1)}"
-            return f"the files contain {states}, at least {FEWEST_STATES} were expected"
+            return f"the files contain {states}, but at least {FEWEST_STATES} were expected"
         if not self.flights and not self.complete:
             return "the files end within a state, and no free flight is found in the part that was read"
         if not self.flights:
@@ -181,6 +182,12 @@ class Overview(NamedTuple):
                 0,
                 f"parts are rigid from {when}, so only later flights can be planned",
             )
+        if self.holes:
+            doubts.insert(
+                0,
+                f"there are no states from {_list_times(self.holes)}: a restart segment may be missing, and no flight "
+                "is assumed across this gap",
+            )
         if not self.complete:
             doubts.append(
                 "the files end within a state; read them again when the run has ended"
@@ -202,7 +209,7 @@ def _describe_flights(flights: Sequence[tuple[str, FreeFlight]]) -> str:
     """Describe the number of flights and the duration of the longest flight."""
     longest = max(flight.end - flight.start for _, flight in flights)
     count = f"{len(flights)} free flight{'s' * (len(flights) > 1)}"
-    return f"{count}, the longest for {longest:.6g}"
+    return f"{count}; the longest lasts {longest:.6g}"
 
 
 def _describe_health(health: Health | None) -> str:
@@ -276,6 +283,7 @@ def describe_run(
         rigid=rigid,
         never_flies=history is not None and denies_every_flight(history),
         energies=energies,
+        holes=history.holes if history else (),
     )
 
 
@@ -447,7 +455,10 @@ def _read_history(run: OpenedRun, selection: Selection) -> History | None:
     for wanted in (selection.parts, selection.flying):
         if wanted:
             select_parts(wanted, run.parts, run.name)
-    return give_if_written(lambda: run.history(selection))
+    history = give_if_written(lambda: run.history(selection))
+    if history:
+        run.check_energy(history)
+    return history
 
 
 def _explain_missing_energy(

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.choice.options import ChoiceOptions
 from d2rpick.choice.pair.grades import FAIR
 from d2rpick.histories.names import Selection
 from d2rpick.histories.opening import open_run
-from d2rpick.vibration.measures import run_time_share
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -22,6 +21,8 @@ if TYPE_CHECKING:
     from d2rpick.histories.run import OpenedRun
     from d2rpick.vibration.modes import Mode
 
+# Smallest number of states from which times can be chosen.
+FEWEST_STATES: Final = 3
 _DEFAULT = Selection()
 
 
@@ -33,7 +34,7 @@ class Reference(NamedTuple):
 
     @classmethod
     def of(cls, run: OpenedRun, selection: Selection = _DEFAULT) -> Reference:
-        """Read the selected energy of an open run; raise FormatError if it is missing."""
+        """Read the selected energy of an open run; raise FormatError if it is missing, HistoryError if it is wrong."""
         if selection.parts:
             # Imported here to keep start-up fast.
             from d2rpick.flight.momentum import (
@@ -41,7 +42,9 @@ class Reference(NamedTuple):
             )
 
             selection = replace_words_by_part_ids(run, selection)
-        return cls(run, run.history(selection))
+        history = run.history(selection)
+        run.check_energy(history)
+        return cls(run, history)
 
     def like(self, run: OpenedRun, selection: Selection = _DEFAULT) -> Reference:
         """Read the same parts from another run of the model, even if the selection gave them different names."""
@@ -88,6 +91,9 @@ class Settings(ChoiceOptions):
 
     def run_time_share(self, rigid_fraction: float) -> float | None:
         """Return the expected run time relative to the reference run [-]; None if the cost fraction is unknown."""
+        # Imported here to keep start-up fast.
+        from d2rpick.vibration.measures import run_time_share
+
         share = self.cost_share
         if share is None:
             return None

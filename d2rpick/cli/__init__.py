@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import importlib
 import os
+import re
 import sys
 from inspect import cleandoc
 from typing import TYPE_CHECKING, Any, Final, NoReturn, TypeVar
@@ -24,20 +25,26 @@ if TYPE_CHECKING:
 # Commands for one run come first, then commands for many runs and decks, then commands that compute runs.
 _WORK: Final = {
     "info": ("one_run", "Show what is in the files of a run."),
-    "drive": ("running", "Compute a Radioss run that switches itself."),
+    "drive": (
+        "running",
+        "Compute a Radioss run and switch its parts at the right times.",
+    ),
     "plan": ("one_run", "Plan the rigid windows of all flights of a run."),
     "suggest": ("one_run", "Choose tr for a td, or both times."),
-    "explore": ("one_run", "Show what each td costs."),
+    "explore": ("one_run", "Compare values of td: error, rigid time and saving."),
     "parts": ("one_run", "List which parts may be switched, and what that saves."),
     "verify": ("one_run", "Judge a pair of times, or a finished switched run."),
     "study": ("study", "Choose tr for many runs, and one tr for all."),
     "follow": (
         "running",
-        "Watch a run while it is computed: when it flies, when to switch.",
+        "Watch a running computation: when the parts fly, when to switch.",
     ),
     "extract": ("one_run", "Write the chosen energy as csv or hdf5."),
     "card": ("decks", "Print solver input for switching windows."),
-    "first": ("running", "Write a deck whose first run switches itself."),
+    "first": (
+        "running",
+        "Write a deck in which the solver chooses the switching times.",
+    ),
     "check": ("decks", "Check the switches of decks, also against a run."),
     "rule": ("decks", "Explain a rule of check, or list all."),
     "calibrate": ("study", "Fit the cost of elements to your own runs."),
@@ -56,9 +63,9 @@ _LIBRARIES: Final = ("click", "numpy", "scipy", "pandas", "h5py", "matplotlib")
 _TIMES: Final = ("--tr", "--td")
 # Largest difference in similarity between the best match for a mistyped option and others that are suggested [-].
 _LESS_ALIKE: Final = 0.1
-_VERSIONS: Final = (
-    "Show the version, and those of the libraries it stands on, and exit."
-)
+# Message of click on arguments that a command does not take.
+_UNEXPECTED: Final = r"Got unexpected extra arguments? \((.*)\)"
+_VERSIONS: Final = "Show the versions of d2rpick and of its libraries, and exit."
 
 
 class _PipeClosed(Exception):  # noqa: N818  this is not an error: the reader of the pipe needs no more output
@@ -198,6 +205,8 @@ def _format_usage_error(error: click.UsageError) -> str:
     """Return the message of a usage error; for an unknown option, it suggests the options that resemble it most."""
     if isinstance(error, click.BadOptionUsage) and "requires an argument" in str(error):
         return _ask_for_value(error)
+    if unexpected := re.fullmatch(_UNEXPECTED, error.message):
+        return _place_unexpected(error, unexpected[1])
     if not isinstance(error, click.NoSuchOption):
         return error.format_message()
     problem = error.message.rstrip(".")
@@ -207,8 +216,15 @@ def _format_usage_error(error: click.UsageError) -> str:
         for parameter in error.ctx.command.params
     ):
         return f"{problem}. Give the {word} by its name alone, without an option"
+    if error.ctx and isinstance(error.ctx.command, click.Group):
+        return f"{problem} before the command; give the options of a command after its name"
+    same = error.option_name.lower()
+    if error.ctx and any(same in option.opts for option in error.ctx.command.params):
+        return f"{problem}. Did you mean {same!r}?"
     if not error.possibilities:
         return error.format_message()
+    if error.ctx and error.ctx.command.name == "plan" and error.option_name == "--td":
+        return f"{problem}. d2rpick plan chooses td itself; d2rpick suggest chooses tr for a given td"
     if error.ctx and error.ctx.command.name == "check" and error.option_name in _TIMES:
         return f"{problem}. The times are those of the deck; d2rpick verify judges other times"
     if error.option_name == "--tr":
@@ -226,6 +242,30 @@ def _format_usage_error(error: click.UsageError) -> str:
     nearest = [name for name in likeness if likeness[name] >= best - _LESS_ALIKE]
     names = " or ".join(map(repr, sorted(nearest, key=lambda name: -likeness[name])))
     return f"{problem}. Did you mean {names}?"
+
+
+def _place_unexpected(error: click.UsageError, words: str) -> str:
+    """Return the message on words that a command does not take, with the place where it takes a file."""
+    if error.ctx is None:
+        return error.format_message()
+    command = error.ctx.command
+    names = [option.name for option in command.params if option.name != "help"]
+    taken = [
+        parameter.make_metavar(error.ctx)
+        for parameter in command.params
+        if isinstance(parameter, click.Argument)
+    ]
+    if taken:
+        problem = f"{words}: unexpected, because d2rpick {command.name} takes one {' '.join(taken)}"
+    else:
+        problem = (
+            f"{words}: unexpected, because d2rpick {command.name} takes options only"
+        )
+    if "history" in names:
+        return f"{problem}; give a history as --history {words}"
+    if "RUN" in taken:
+        return f"{problem}; if these are files of one run, give their folder"
+    return f"{problem}; leave it out, or put quotes around a name with spaces"
 
 
 def _list_commands_with_option(error: click.NoSuchOption) -> list[str]:

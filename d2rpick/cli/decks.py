@@ -8,6 +8,7 @@ import click
 
 from d2rpick.base.errors import INTERNAL_ERROR
 from d2rpick.cli import options
+from d2rpick.cli.missing import list_needs_of_card
 from d2rpick.cli.options import FILES, REFERENCE, RESULT
 from d2rpick.cli.output import (
     Output,
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
     from d2rpick.api.request import Request
 
 
-@options.make_command
+@options.make_command_with_needs(list_needs_of_card)
 @options.make_time_option(
     "--tr", "Switch to rigid at this time; repeatable.", many=True
 )
@@ -37,9 +38,10 @@ if TYPE_CHECKING:
 )
 @options.add_options(
     *("part", *CARDS, "deck", "no_deck", *REFERENCE, *FILES, "exit_zero"),
-    deck="Main deck of the run of --history, which defines the parts that become one rigid body.",
+    deck="Main deck of the run, which defines the parts that become one rigid body; it is checked with the card.",
     part={
-        "help": "Parts to switch, by number (3,7) or range (10-19), or with --history by title.",
+        "help": "Parts to switch: number (3,7) or range (10-19); with --history also title, "
+        '"flying", "all" or, with --deck too, "recommended".',
         "type": choose_click_type("names"),
         "instead_of": (),
     },
@@ -55,7 +57,7 @@ def card(
     """Print solver input for switching windows, ready to be pasted.
 
     With a history, d2rpick judges the times as printed, and adds the verdict as a comment.  With the deck of the run,
-    it merges parts that share nodes, and checks the deck with the card in it.
+    it merges parts that share nodes, and checks the deck with the card in it.  The deck needs no history.
 
     Examples
     --------
@@ -72,7 +74,7 @@ def card(
     times = _read_windows(tr, td, windows)
     run = options.open_judging_run(request)
     output = output.beside(windows, *(run.sources if run else ()))
-    judged_card = print_card(times, run, request, cards)
+    judged_card = print_card(times, run, request, cards, windows or "")
     question = request.repeat()
     if judged_card.verdicts:
         history = judged_card.verdicts[0].situation.history
@@ -90,18 +92,14 @@ def card(
 def _read_windows(
     tr: Sequence[float], td: Sequence[float], file: str | None
 ) -> Sequence[tuple[float, float]]:
-    """Return the windows from pairs of times or from a file; raise UsageError if there are none."""
+    """Return the windows from pairs of times or from a file; raise UsageError if the pairs are incomplete."""
     if file is not None:
         if tr or td:
             raise click.UsageError("--windows excludes --tr and --td")
         return options.read_windows_in(file)
-    if not tr or not td:
-        raise click.UsageError(
-            f"a card needs {'--td' if tr else '--tr'}; or --windows, a file with lines 'tr td'"
-        )
     if len(tr) != len(td):
         raise click.UsageError(
-            f"{len(tr)} --tr and {len(td)} --td were given, a --td for each --tr was expected"
+            f"{len(tr)} --tr and {len(td)} --td were given, but a --td for each --tr was expected"
         )
     return list(zip(tr, td, strict=True))
 

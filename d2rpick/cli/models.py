@@ -10,6 +10,7 @@ from d2rpick.api.models import HISTORIES, Box, Motion, Scanning, warn_if_unbalan
 from d2rpick.base.errors import ArgumentError, D2RPickError
 from d2rpick.base.options import list_options
 from d2rpick.cli import options
+from d2rpick.cli.missing import list_needs_of_motion
 from d2rpick.cli.options import FILES, RESULT
 from d2rpick.cli.progress import show_counting
 from d2rpick.report.formats import FORMATS, PLAIN, write
@@ -27,7 +28,9 @@ SOLVER = {
     "pairs": ("reference_m", "published_m", "better_m"),
     "run": ("z_m", "y_m", "vz_mps", "vy_mps"),
 }
-_SOLVER_COLUMNS: Final = ", or ".join(map(", ".join, SOLVER.values()))
+_SOLVER_COLUMNS: Final = ", or ".join(
+    f"{', '.join(columns[:-1])} and {columns[-1]}" for columns in SOLVER.values()
+)
 SECTIONS = ("1", "2", "3", "4", "5")
 _ABSENT = (
     "reproduce needs the folder validation of the repository, which is not installed with the package; clone the "
@@ -35,7 +38,7 @@ _ABSENT = (
 )
 
 
-@options.make_command
+@options.make_command_with_needs(list_needs_of_motion)
 @options.add_options(
     *list_options(Motion), of=[Motion],
     stiffness=_NEEDED, mass=_NEEDED, alpha={"default": 0.0}, t_end=_NEEDED, dt=_NEEDED,
@@ -61,6 +64,7 @@ def replay(motion: Motion, output: Output) -> None:
 
     form = choose_history_format(output.output_file, HISTORIES, motion.write_as)
     output = output.beside()
+    output.notes(motion.notes, ())
     trajectory, switched = motion.computed()
     if output.plot:
         from d2rpick.report import figures, figures_models
@@ -87,7 +91,7 @@ def replay(motion: Motion, output: Output) -> None:
     plot="Draw the motion of the box, or the scan, to FILE (png, svg, pdf).",
 )
 def rollover(box: Box, output: Output) -> None:
-    """Compute a planar box that trips over the curb of a braking sled and rolls, or falls and bounces.  SI units.
+    """Compute a planar box in SI units that trips over the curb of a braking sled and rolls, or that falls and bounces.
 
     The box is deformable throughout, or rigid from each tr to its td.  The step that meets the curb stays deformable,
     or is switched together with the box (--with-step).
@@ -162,8 +166,8 @@ def _scan(box: Box, output: Output) -> None:
 )  # fmt: skip
 @options.make_file_option(
     "--solver",
-    f"Table of a solver's runs of the same oscillator, for comparison, with the columns time_s and {_SOLVER_COLUMNS}; "
-    "repeatable.",
+    f"Table of solver runs of the same oscillator, for comparison.  The columns are time_s, and either "
+    f"{_SOLVER_COLUMNS}.  Repeatable.",
     many=True,
 )
 @options.add_options(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -23,12 +23,12 @@ from d2rpick.cli import options
 from d2rpick.cli.options import (
     ANSWER,
     DECK,
-    DECK_OF_PARTS,
     FILES,
     HISTORY,
     ONE_RUN,
     RESULT,
     WINDOW,
+    WITH_RECOMMENDED,
 )
 from d2rpick.cli.output import (
     IN_WORDS,
@@ -43,6 +43,8 @@ from d2rpick.cli.values import CARDS
 from d2rpick.report.formats import FORMATS, WrittenDeck, write
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
     from d2rpick.api.asked import RunQuestion
     from d2rpick.api.cards import Cards
     from d2rpick.api.judged_cards import JudgedCard
@@ -91,12 +93,11 @@ def extract(write_as: str | None, request: Request, output: Output) -> None:
     """Write the chosen energy of HISTORY as columns time and internal_energy.
 
     With several parts, a column part_<id> follows for each.  A column not_chosen_part_<id> or not_chosen_spring_<id>
-    follows for each other part that flies with the chosen parts, so that d2rpick judges this table as it judges the
-    original run.  The momenta and
-    kinetic energies of single parts are not written; without them, times and errors may differ from those of the run.
-    Other columns are quantities of the whole model, such as total internal energy, kinetic energy, external work and
-    momentum.  If the files contain part momenta, the momentum is the sum over the parts that fly together with the
-    chosen parts.
+    follows for each other part that flies with the chosen parts, so that d2rpick can judge this table nearly as it
+    judges the original run.  The momenta and kinetic energies of individual parts are not written, so times and errors
+    may differ from the values for the run.  Other columns are quantities of the whole model, such as total internal
+    energy, kinetic energy, external work and momentum.  If the files contain part momenta, the momentum is the sum over
+    the parts that fly together with the chosen parts.
 
     Examples
     --------
@@ -131,7 +132,7 @@ def extract(write_as: str | None, request: Request, output: Output) -> None:
     "limit",
     *ONE_RUN,
     *ANSWER,
-    deck=DECK_OF_PARTS,
+    **WITH_RECOMMENDED,
     min_quality=f"{MIN_QUALITY}  [default: fair; poor if only --td is given]",
     forms=[*FORMATS["suggestion"], "card"],
 )
@@ -215,11 +216,15 @@ def _finish_answer(
     question: RunQuestion,
     decision: VerdictOnPair | None,
     min_quality: str,
+    introduction: str = "",
 ) -> None:
-    """Exit with code 1 if the verdict is below ``min_quality``, or if a given deck was not used."""
+    """Exit with code 1 if the verdict is below ``min_quality``, or if a given deck was not used.
+
+    The message on the verdict begins with the ``introduction``.
+    """
     if question.unused_deck:
         output.finish_without_deck(question.unused_deck)
-    output.finish_by_verdict(decision, min_quality)
+    output.finish_by_verdict(decision, min_quality, introduction)
 
 
 @options.make_command
@@ -245,7 +250,7 @@ def _finish_answer(
         "default": 10,
         "help": "Number of rows in the table of the best pairs; json and csv contain all pairs.",
     },
-    deck=DECK_OF_PARTS,
+    **WITH_RECOMMENDED,
     forms=FORMATS["trade_off"],
 )
 def explore(
@@ -256,11 +261,12 @@ def explore(
     cards: Cards,
     output: Output,
 ) -> None:
-    """For each td, show the best tr, the error and the saving.
+    """Show the best tr, the error and the rigid time for each td.
 
     In --td-window, or in the longest flight, d2rpick compares evenly spaced values of td, and every peak of the energy.
-    It judges each td as `suggest --td` does.  The table lists the pairs that no other pair beats in both error and
-    rigid time.  d2rpick also names the nearest td with half the error.
+    It judges each td as `suggest --td` does.  The table lists the Pareto-optimal pairs: no other pair has a smaller
+    error with at least the same rigid time, or a longer rigid time with at most the same error.  d2rpick also names the
+    nearest td with half the error.
 
     Examples
     --------
@@ -290,7 +296,17 @@ def explore(
     _finish_answer(output, question, decision, question.settings.min_quality)
 
 
-@options.make_command
+def _list_needs_of_pair(values: Mapping[str, Any]) -> Iterable[str]:
+    """Yield the times that ``verify`` lacks."""
+    if values.get("switched"):
+        return
+    times = [name for name in ("tr", "td") if values.get(name) is None]
+    if times:
+        names = " and ".join(f"--{name} T" for name in times)
+        yield f"{names} (or --switched FILE, a finished switched run)"
+
+
+@options.make_command_with_needs(_list_needs_of_pair)
 @options.make_time_option(
     "--tr", "Switch to rigid at this time.  [default: read from the run of --switched]"
 )
@@ -312,7 +328,7 @@ def explore(
     ),
     default=MIN_MEAN_ENERGY,
 )
-@options.add_options(*ONE_RUN, *ANSWER, deck=DECK_OF_PARTS, forms=FORMATS["verdict"])
+@options.add_options(*ONE_RUN, *ANSWER, **WITH_RECOMMENDED, forms=FORMATS["verdict"])
 def verify(
     tr: float | None,
     td: float | None,
@@ -356,7 +372,16 @@ def verify(
     )
     if answer.switched and answer.switched.objections:
         output.finish_with_failed_comparison()
-    _finish_answer(output, question, answer.decision, question.settings.min_quality)
+    introduction = (
+        "the comparison is within its limits, but " if answer.switched else ""
+    )
+    _finish_answer(
+        output,
+        question,
+        answer.decision,
+        question.settings.min_quality,
+        introduction,
+    )
 
 
 @options.make_command
@@ -380,7 +405,7 @@ def verify(
         *RESULT,
     ),
     deck=f"{DECK}.",
-    step_ratio="Time step while the parts are rigid, divided by the time step before, 1 or more.",
+    step_ratio="Time step while the parts are rigid, divided by the time step before; at least 1.",
     report="Write everything to one HTML page to read and sign.",
     forms=FORMATS["parts"],
 )
@@ -415,8 +440,8 @@ def parts(tr: float | None, td: float | None, request: Request, output: Output) 
 
 @options.make_command
 @options.make_click_option("min_rigid", Option(
-    "Shortest rigid window.  [default: 5% of the record; a window that freezes vibration energy is also "
-    "left out if a later window is more than twice as long]",
+    "Shortest rigid window.  [default: 5% of the record; without this option, d2rpick also leaves out a window that "
+    "freezes vibration energy if a later window is more than twice as long]",
     *(NOT_NEGATIVE, "T"),
 ))  # fmt: skip
 @click.option(
@@ -426,11 +451,13 @@ def parts(tr: float | None, td: float | None, request: Request, output: Output) 
 @options.make_file_option(
     "--done",
     "File with the windows in which HISTORY was switched, a line 'tr td' for each, or the journal of d2rpick drive.  "
-    "d2rpick plans the later windows; -f value, -f card and --write-deck contain both.",
+    "d2rpick plans the later windows; the output of -f value, -f card and --write-deck contains the finished and the "
+    "new windows.",
 )
 @options.make_file_option(
     "--before",
-    "Run from which the windows of --done were planned, to compare its landings; repeatable.",
+    "Run from which the windows of --done were planned; its landings are compared with the landings in HISTORY.  "
+    "Repeatable.",
     *("HISTORY",), many=True,
 )  # fmt: skip
 @options.make_file_option(
@@ -452,7 +479,7 @@ def parts(tr: float | None, td: float | None, request: Request, output: Output) 
         *CARDS,
         *RESULT,
     ),
-    deck=DECK_OF_PARTS,
+    **WITH_RECOMMENDED,
     forms=[*FORMATS["plan"], "card"],
 )
 def plan(

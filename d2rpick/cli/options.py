@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from d2rpick.api.runs import Run
+    from d2rpick.cli.missing import ListNeeds
 
 WINDOW = tuple[float, float] | None
 # Type of a command function; click's decorators have no more specific type.
@@ -54,9 +55,12 @@ DECK: Final = (
     "Main deck of the run (LS-DYNA, or a starter or engine file of Radioss): defines the cost of the parts, and "
     "which of them become one rigid body"
 )
-DECK_OF_PARTS: Final = (
-    f"{DECK}.  `--part recommended` is the set that d2rpick parts recommends."
-)
+# Help of the commands that accept the recommended set of parts, which follows from the deck.
+WITH_RECOMMENDED: Final = {
+    "deck": f"{DECK}.  `--part recommended` is the set that d2rpick parts recommends.",
+    "part": 'Parts to switch: number (3,7), range (10-19), title, "flying", "all" or, with a deck, "recommended"; '
+    "energies are added.",
+}
 # Sections of the help; options that belong to no section come first.
 _CARDS: Final = "Cards"
 GROUPS: Final[dict[str, tuple[str, ...]]] = {
@@ -88,7 +92,16 @@ _SOURCES: Final = {
 
 
 class Command(Documented):
-    """A command that can show its settings instead of running, and that names options in messages about arguments."""
+    """A command that can show its settings instead of running, and that names options in messages about arguments.
+
+    ``list_needs`` names what the command needs depending on the given values.
+    """
+
+    def __init__(
+        self, *args: Any, list_needs: ListNeeds | None = None, **settings: Any
+    ) -> None:
+        super().__init__(*args, **settings)
+        self._list_needs = list_needs
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Read the command line. Options set neither there nor in the environment are taken from the settings file."""
@@ -98,22 +111,43 @@ class Command(Documented):
         table, source, ctx.meta["d2rpick.unused"] = find_nearest_settings(os.curdir)
         ctx.meta["d2rpick.settings"] = source
         if table:
-            without = click.Context(
-                self, ctx.parent, ctx.info_name, resilient_parsing=True
-            )
-            super().parse_args(without, list(args))
+            without = self._read_leniently(ctx, args)
             ctx.default_map = read_settings(ctx, without, table, source)
+        # click empties the original list.
+        typed = list(args)
         try:
             remaining = super().parse_args(ctx, args)
+        except click.MissingParameter:
+            self._refuse_missing(ctx, self._read_leniently(ctx, typed))
+            raise
         except click.BadOptionUsage as error:
             # click omits the context, without which the message cannot say what the option means.
             error.ctx = error.ctx or ctx
             raise
+        if self._list_needs:
+            self._refuse_missing(ctx, ctx)
         if words := list_words(ctx):
             ctx.meta["d2rpick.command"] = insert_options(
                 ctx.meta["d2rpick.command"], words
             )
         return remaining
+
+    def _read_leniently(self, ctx: click.Context, words: list[str]) -> click.Context:
+        """Return a context with the values of the command line and the environment, without refusing any."""
+        lenient = click.Context(self, ctx.parent, ctx.info_name, resilient_parsing=True)
+        lenient.default_map = ctx.default_map
+        super().parse_args(lenient, list(words))
+        return lenient
+
+    def _refuse_missing(self, ctx: click.Context, given: click.Context) -> None:
+        """Raise UsageError if a required parameter or something else that the command needs is not ``given``."""
+        if ctx.meta[_SETTINGS_ONLY]:
+            return
+        # Imported here to keep start-up fast.
+        from d2rpick.cli.missing import explain_missing
+
+        if message := explain_missing(ctx, given.params, self._list_needs):
+            raise click.UsageError(message, ctx)
 
     def get_params(self, ctx: click.Context) -> list[click.Parameter]:
         """Return the parameters, none of which is required if only the settings are shown."""
@@ -159,9 +193,10 @@ class Command(Documented):
         if ctx.meta.get("d2rpick.show-settings"):
             return click.echo(encode_text("\n".join(_list_settings(ctx))))
         if (words := list_words(ctx)) and not ctx.params.get("quiet"):
-            import shlex  # Imported here to keep start-up fast.
+            # Imported here to keep start-up fast.
+            from d2rpick.report.tables import quote_shell_line
 
-            tell(f"note: {shlex.join(words)} by {ctx.meta['d2rpick.settings']}")
+            tell(f"note: {quote_shell_line(words)} by {ctx.meta['d2rpick.settings']}")
         convert_typed_times(ctx)
         # numpy is imported here, at a small call depth, because its import makes many nested calls.
         # In Python 3.11, nested calls are slow if they repeatedly cross the end of a chunk of the call stack.
@@ -204,6 +239,13 @@ class Either(click.Option):
 def make_command(function: Decorated) -> click.Command:
     """Turn a function into a command."""
     return make_documented(Command)(function)
+
+
+def make_command_with_needs(
+    list_needs: ListNeeds,
+) -> Callable[[Decorated], click.Command]:
+    """Turn a function into a command that refuses a command line without what ``list_needs`` names."""
+    return make_documented(Command, list_needs=list_needs)
 
 
 def add_options(
@@ -417,7 +459,7 @@ _FLAGS: Final = [
         ),
         (
             ["-v", "--verbose"],
-            "Print all details, and on stderr what was read and how long reading took.",
+            "Print all details; print the files that were read, and the time that reading took, to stderr.",
         ),
     )
 ]

@@ -43,6 +43,8 @@ _NARROWEST: Final = 40
 _NAMED: Final = {".json": "json", ".ndjson": "ndjson", ".csv": "csv", ".md": "markdown"}
 # Suffixes of unsupported files that users may expect for a report.
 _PRINTED: Final = (".pdf", ".doc", ".docx")
+# Suffixes of a report.
+_PAGES: Final = (".html", ".htm", ".xhtml")
 # Pattern of the result lines that are printed in bold: recommendations, verdicts, and findings of rules.
 _VERDICTS: Final = "use|use with care|do not use|no pair to use|common tr"
 _ANSWER: Final = rf"(?m)^(\* |(  )?({_VERDICTS})\b|  .*:\d+:\d+: (error|warning) D2R).*"
@@ -96,7 +98,7 @@ class Output:
     )
     overwrite: bool = make_option("Replace existing files.", "flag", default=False)
     quiet: bool = make_option(
-        "Print no notes and warnings to stderr.", "flag", default=False, short=("-q",)
+        "Print no notes or warnings to stderr.", "flag", default=False, short=("-q",)
     )
     limit: int = make_option(
         "Number of rows in the table; json and csv contain all.",
@@ -152,7 +154,7 @@ class Output:
             by_itself or self.output_format == "card" or self.report is not None
         ):
             raise ArgumentError(
-                f"--{make_option_name(cards.given[0])} is about the card; ask for one with -f card or --report"
+                f"--{make_option_name(cards.given[0])} is an option of the card; get one with -f card or --report FILE"
             )
 
     def shown(self, **further: Any) -> DisplayOptions:
@@ -195,16 +197,22 @@ class Output:
             click.get_current_context().exit(OBJECTION)
 
     def finish_by_verdict(
-        self, decision: VerdictOnPair | None, min_quality: str
+        self,
+        decision: VerdictOnPair | None,
+        min_quality: str,
+        introduction: str = "",
     ) -> None:
-        """Exit with code 1 if there is no pair or its grade is below ``min_quality``; a message states the grade."""
+        """Exit with code 1 if there is no pair or its grade is below ``min_quality``; a message states the grade.
+
+        The message begins with the ``introduction``.
+        """
         if decision is None or decision.reaches(min_quality):
             self.finish(objection=decision is None)
             return
         if not self.exit_zero:
             verdict = f"the verdict is {decision.verdict!r} (grade {decision.grade})"
             tell(
-                f"d2rpick: exit code {OBJECTION}: {verdict}; --min-quality {decision.grade} accepts it"
+                f"d2rpick: exit code {OBJECTION}: {introduction}{verdict}; --min-quality {decision.grade} accepts it"
             )
         self.finish(objection=True)
 
@@ -350,10 +358,15 @@ def _check_report(name: str | None) -> None:
     """Raise D2RPickError if the file name of a report implies a format other than HTML."""
     if name == "-":
         raise D2RPickError("-: --report writes a file; give its name")
-    if name is not None and name.lower().endswith(_PRINTED):
+    if name is None:
+        return
+    stem, suffix = os.path.splitext(name)  # noqa: PTH122  pathlib would slow down start-up
+    if suffix.lower() in _PRINTED:
         raise D2RPickError(
             f"{name}: the report is an HTML page; name it .html, and print it to PDF in a browser"
         )
+    if suffix and suffix.lower() not in _PAGES:
+        raise D2RPickError(f"{name}: the report is an HTML page; name it {stem}.html")
 
 
 def _find_implied_format(name: str) -> str | None:
@@ -416,8 +429,35 @@ def explain_error(error: BaseException, inputs: Sequence[str] = ()) -> str:
 
         click.echo("".join(traceback.format_exception(error)), err=True, nl=False)
     if isinstance(error, FORESEEN):
-        return replace_arguments(format_in_one_line(error))
+        return name_options(format_in_one_line(error))
     return f"{list_names(inputs)}{': ' * bool(inputs)}{format_in_one_line(error)}; --debug shows where"
+
+
+def name_options(text: str) -> str:
+    """Replace argument names with the options of the current command.
+
+    A file that belongs to another option is named with this option, or without a cure if the command has none.
+    """
+    text = replace_arguments(text)
+    for option in ("history", "deck"):
+        cure = f", and this file as --{option}"
+        if cure in text:
+            text = text.replace(cure, _name_place(option))
+    return text
+
+
+def _name_place(name: str) -> str:
+    """Return where the current command takes a history or a deck; empty if it takes none."""
+    context = click.get_current_context()
+    command: click.Command | None = context.command
+    if isinstance(command, click.Group):
+        command = command.get_command(context, context.invoked_subcommand or "")
+    for parameter in command.params if command else ():
+        if parameter.name == name:
+            is_option = isinstance(parameter, click.Option)
+            place = f"--{name}" if is_option else name.upper()
+            return f", and this file as {place}"
+    return ""
 
 
 def encode_text(text: str) -> bytes:
@@ -433,7 +473,7 @@ def name_options_and_wrap(text: str, form: str, width: int = 0) -> str:
     >>> name_options_and_wrap("choose with `energy`", "table")
     'choose with --energy'
     """
-    text = replace_arguments(text)
+    text = name_options(text)
     if form != "table" or not width:
         return text
     from d2rpick.report.tables import wrap_lines  # Imported here to keep start-up fast.

@@ -8,22 +8,24 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from d2rpick.base.errors import make_printable
-from d2rpick.base.options import NOT_NEGATIVE, POSITIVE, Option
+from d2rpick.base.options import NOT_NEGATIVE, POSITIVE, UNLIMITED, Option
 from d2rpick.cli import options
+from d2rpick.cli.missing import list_needs_of_drive, list_needs_of_first
 from d2rpick.cli.output import Output, encode_text, name_options_and_wrap, tell
 from d2rpick.cli.progress import show_progress
-from d2rpick.cli.values import choose_click_type
+from d2rpick.cli.values import SECONDS, choose_click_type
 from d2rpick.report.formats import FORMATS
 
 if TYPE_CHECKING:
     from d2rpick.api.drives import Driving
     from d2rpick.api.request import Request
+    from d2rpick.report.follow import Event
 
 
 CMD = ("program", "CMD")
 
 
-@options.make_command
+@options.make_command_with_needs(list_needs_of_drive)
 @click.argument("deck", type=choose_click_type("file"))
 @click.option(
     "-o", "folder", metavar="RUNDIR", required=True, type=choose_click_type("output"),
@@ -66,7 +68,7 @@ CMD = ("program", "CMD")
     ),
 )
 @click.option(
-    "--threads", type=click.IntRange(min=1), default=1, show_default=True, metavar="N",
+    "--threads", type=choose_click_type(range(1, UNLIMITED)), default=1, show_default=True, metavar="N",
     help="Threads of the solver; {threads} in a command.",
 )  # fmt: skip
 @click.option("--resume", is_flag=True, help="Resume a run that was started in RUNDIR.")
@@ -94,9 +96,9 @@ def drive(
     r"""Compute a Radioss run that needs no reference run, because d2rpick switches the parts as the run proceeds.
 
     DECK, a starter deck with one engine file, is copied into RUNDIR.  The parts are treated as flying when no force has
-    acted on them for the time --wait.  A rigid probe run then finds the next contact.  From one margin before this
-    contact, the run continues with deformable parts.  The result is reproducible: the same command gives the same run.
-    --resume continues an interrupted run.
+    acted on them for the time --wait.  A rigid probe run then finds the next contact.  The run then continues with
+    deformable parts from a time that is one margin before this contact.  The result is reproducible: the same command
+    gives the same run.  --resume continues an interrupted run.
 
     Examples
     --------
@@ -115,6 +117,7 @@ def drive(
     driving = Driving(deck, Path(folder), report, **driving_options)
     output.notes(driving.deck.notes, driving.cautions)
     if dry_run:
+        driving.refuse_other_files()
         click.echo("\n".join(_plan(driving)))
         return output.finish(objection=bool(driving.commands.missing()))
     signal.signal(signal.SIGTERM, signal.default_int_handler)
@@ -135,12 +138,15 @@ def _plan(driving: Driving) -> list[str]:
     import shlex
 
     from d2rpick.report.parts import format_count
+    from d2rpick.report.tables import quote_shell_line
 
     deck = driving.deck
     commands = driving.commands
     bodies = ", ".join(map(str, deck.nodes))
     typed = click.get_current_context().meta["d2rpick.command"]
-    again = shlex.join(["d2rpick", *(word for word in typed if word != "--dry-run")])
+    again = quote_shell_line(
+        ["d2rpick", *(word for word in typed if word != "--dry-run")]
+    )
     missing = commands.missing()
     correct = (
         f"correct --starter or --engine, because there is no program {missing!r}, then "
@@ -167,10 +173,10 @@ def _plan(driving: Driving) -> list[str]:
     is_flag=True,
     cls=options.Either,
     instead_of=("lasting",),
-    help="Report the present state, and end.",
+    help="Report the present state, and exit.",
 )
 @click.option(
-    "--for", "lasting", type=choose_click_type(NOT_NEGATIVE), metavar="T", cls=options.Either, instead_of=("once",),
+    "--for", "lasting", type=choose_click_type(NOT_NEGATIVE), metavar=SECONDS, cls=options.Either, instead_of=("once",),
     help="Stop watching after this number of seconds.  [default: when the run has ended]",
 )  # fmt: skip
 @options.add_options(
@@ -186,10 +192,13 @@ def follow(
     request: Request,
     output: Output,
 ) -> None:
-    """Watch RUN, files or a folder, while it is computed: report when the parts fly, and when to switch.
+    """Watch RUN (a file or a folder) while the solver computes it, and report when the parts fly and when to switch.
 
     d2rpick prints a line for each event: load, flight with its evidence, recommended switch, contact, restart, silence,
     end.  RUN need not have started.  d2rpick does not start, stop or change anything.
+
+    With --once and --for, the exit code is 0 if the parts fly at the last state.  It is 1 if they do not fly but the
+    run may continue, and 2 if the run has ended without flying parts or RUN does not exist.
 
     Examples
     --------
@@ -201,12 +210,14 @@ def follow(
     if once and lasting is not None:
         raise click.UsageError("--once and --for exclude each other")
     seconds = 0.0 if once else lasting
-    failed, since = False, None
+    last: Event | None = None
+    ending = ""
     for event in events(
         run, parts=request.part or None, wait=wait, deck=request.deck, lasting=seconds
     ):
-        failed = failed or event.event == "failed"
-        since = event.time
+        last = event
+        if event.event in ("ended", "failed", "restart"):
+            ending = event.event
         if output.output_format == "ndjson":
             text = json.dumps(event._asdict(), allow_nan=False)
         else:
@@ -218,13 +229,43 @@ def follow(
             ),
             nl=False,
         )
-    is_on_ground = seconds is not None and since is None
-    if is_on_ground and not failed and not output.exit_zero:
-        tell("d2rpick: exit code 1: the parts do not fly at the last state")
-    output.finish(objection=failed or is_on_ground)
+    if seconds is None:
+        output.finish(objection=ending == "failed")
+    else:
+        assert last is not None
+        _finish_look(run, last, ending, output)
 
 
-@options.make_command
+def _finish_look(run: str, last: Event, ending: str, output: Output) -> None:
+    """Exit with 0 if the parts fly at the last state, 2 if they never will, and otherwise 1.
+
+    A script that waits for a flight needs the difference between 1 and 2. ``ending`` is the last event that ends or
+    restarts the run.
+    """
+    if last.seen is None and not _exists(run):
+        tell("d2rpick: exit code 2: there is no such file or folder")
+        click.get_current_context().exit(2)
+    code, reason = 0, ""
+    if ending == "failed":
+        code, reason = 2, "the run has ended with an error"
+    elif last.time is None and ending == "ended":
+        code, reason = 2, "the run has ended, and the parts do not fly"
+    elif last.time is None:
+        code, reason = 1, "the parts do not fly at the last state"
+    if code and not output.exit_zero:
+        tell(f"d2rpick: exit code {code}: {reason}")
+        click.get_current_context().exit(code)
+
+
+def _exists(run: str) -> bool:
+    """Return True if a name is that of a file or folder, or a pattern that matches one."""
+    from glob import glob
+    from pathlib import Path
+
+    return Path(run).exists() or bool(glob(run, recursive=True))  # noqa: PTH207  Path.glob needs the folder
+
+
+@options.make_command_with_needs(list_needs_of_first)
 @click.argument("deck", type=choose_click_type("file"))
 @options.make_click_option(
     "part",

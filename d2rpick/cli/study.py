@@ -23,13 +23,13 @@ from d2rpick.base.errors import (
 from d2rpick.base.options import UNLIMITED, Option
 from d2rpick.cli import options
 from d2rpick.cli.options import RESULT, WINDOW
-from d2rpick.cli.output import Output, tell
+from d2rpick.cli.output import Output, name_options, tell
 from d2rpick.cli.progress import show_counting
 from d2rpick.cli.values import choose_click_type
 from d2rpick.report.formats import FORMATS, RepeatedQuestion
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
 
     from d2rpick.api.studies import Ledger, Study
     from d2rpick.base.workers import Farm
@@ -145,7 +145,7 @@ def _finish_study(answer: Study, output: Output) -> None:
     """Exit with the code that the answer requires, after a message that explains the code."""
     if not answer.judged:
         tell(
-            f"d2rpick: no run could be judged; the first: {answer.runs[0].message or ''}"
+            f"d2rpick: no run could be judged; the first: {name_options(answer.runs[0].message or '')}"
         )
     if not answer.judged or any(row.status == INTERNAL_ERROR for row in answer.runs):
         click.get_current_context().exit(2)
@@ -183,8 +183,8 @@ def _is_unmatched_pattern(name: str) -> bool:
     return any(sign in name for sign in "*?[") and not os.path.lexists(name)
 
 
-def _read_list(name: str) -> Iterator[str]:
-    """Yield the names in a list file, one per line; blank lines and comments are skipped."""
+def _read_list(name: str) -> list[str]:
+    """Return the names in a list file, one per line; blank lines and comments are skipped."""
     from pathlib import Path
 
     if name == "-" and sys.stdin is None:
@@ -202,9 +202,21 @@ def _read_list(name: str) -> Iterator[str]:
             f"{name}: holds NUL bytes; give a text file with one run per line"
         )
     # splitlines() is not used, because it also splits at characters that names may contain.
-    for text in os.fsdecode(content).removeprefix("\ufeff").split("\n"):
-        if (text := text.strip()) and not text.startswith("#"):
-            yield text
+    lines = os.fsdecode(content).removeprefix("\ufeff").split("\n")
+    names = [
+        text for line in lines if (text := line.strip()) and not text.startswith("#")
+    ]
+    if len(names) > 1 and not any(map(_may_be_run, names)):
+        raise FormatError(
+            f"{name}: none of its {len(names)} lines names a file or folder, the first is {names[0]!r}; give a file "
+            "with one run per line, or name a run without --from"
+        )
+    return names
+
+
+def _may_be_run(name: str) -> bool:
+    """Return True for a name that exists or is a pattern."""
+    return os.path.lexists(name) or any(sign in name for sign in "*?[")
 
 
 def _check_ledger(name: str | None, written: Mapping[str, str | None]) -> None:
@@ -256,8 +268,8 @@ def _choose_farm(
 def calibrate(folders: tuple[str, ...], output: Output) -> None:
     """Fit the cost of elements to the CPU times of your runs, for --weights.
 
-    Each RUN is the folder of one run, with its deck and the listings of its solver: NAME_0001.out with /MON/ON of
-    Radioss, d3hsp or glstat of LS-DYNA.  Give runs of the same model with and without switching.  If the runs
+    Each RUN is the folder of one run, with its deck and the listings of its solver: NAME_0001.out for Radioss (run with
+    /MON/ON), or d3hsp or glstat for LS-DYNA.  Give runs of the same model with and without switching.  If the runs
     cannot distinguish the costs of two formulations, their built-in ratio is kept.  A run that is named twice is used
     once.
 

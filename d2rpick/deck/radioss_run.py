@@ -16,6 +16,11 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import DeckError, choose_verb, format_ranges, name_units
 from d2rpick.deck.card import CardField, Value
+from d2rpick.deck.not_decks import (
+    refuse_binary_history,
+    refuse_packed,
+    refuse_text_history,
+)
 from d2rpick.deck.radioss_columns import UNITS
 from d2rpick.deck.radioss_deck import (
     RadiossLeg,
@@ -113,15 +118,19 @@ def read_run(path: str, content: bytes | None = None) -> RadiossRun:
         source = SourceFile(name, content)
         head = source.read(0, HEAD)
         if not is_radioss(head):
+            refuse_packed(name, head)
+            refuse_binary_history(name, head)
             is_ls_dyna = re.search(rb"(?im)^\*KEYWORD", head) is not None
             found = (
                 "this is an LS-DYNA deck"
                 if is_ls_dyna
                 else "no /BEGIN or /RUN was found"
             )
+            if not is_ls_dyna:
+                refuse_text_history(name, head)
             cure = "; for LS-DYNA see d2rpick first" if is_ls_dyna else ""
             raise DeckError(
-                f"{name}: {found}, a file of a Radioss run was expected{cure}"
+                f"{name}: {found}, but a file of a Radioss run was expected{cure}"
             )
         run.deck.sources.append(source)
         if re.search(ENGINE, head):

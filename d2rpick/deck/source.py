@@ -13,6 +13,11 @@ from typing import TYPE_CHECKING, Final
 from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import DeckError
 from d2rpick.base.files import bound, describe_excess, find_long_line
+from d2rpick.deck.not_decks import (
+    refuse_binary_history,
+    refuse_packed,
+    refuse_text_history,
+)
 from d2rpick.deck.stored import HELD_UP_TO, HeldInMemory, open_stored
 
 if TYPE_CHECKING:
@@ -38,7 +43,6 @@ BYTE_ORDER_MARK: Final = b"\xef\xbb\xbf"  # Byte order mark of UTF-8.
 _PIECE: Final = 4 << 20
 # Line endings of a block are counted in this number of sections, so that each section fits into the processor cache.
 _COUNTED: Final = 16
-_GZIP: Final = b"\x1f\x8b\x08"
 _FIRST: Final = 1 << 16  # Number of bytes that should contain a line ending.
 _HEAD: Final = 1024  # Largest number of bytes that are read of a keyword line.
 # Number of bytes before a keyword in which comments on it are expected.
@@ -218,17 +222,26 @@ class SourceFile:
     def marks(self) -> Sequence[int]:
         """Return the offsets of all keywords and encrypted blocks; raise DeckError if no solver can read the file."""
         first = self.read(0, _FIRST)
-        if first.startswith(_GZIP):
-            raise DeckError(f"{self.name}: the deck is compressed with gzip; unpack it")
+        refuse_packed(self.name, first)
+        refuse_binary_history(self.name, first)
         if b"\r" in first and b"\n" not in first:
             raise DeckError(
                 f"{self.name}: lines end in CR alone (expected LF or CR LF); convert the line ends"
             )
         return find_marks(self._file)
 
+    def refuse_history(self) -> None:
+        """Raise DeckError if the file is a history or compressed."""
+        head = self.read(0, _FIRST)
+        refuse_packed(self.name, head)
+        refuse_binary_history(self.name, head)
+        if not self.marks:
+            refuse_text_history(self.name, head)
+
     def describe_lack_of_keywords(self) -> str:
-        """Return why a file has no keyword."""
-        head = self.read(0, _HEAD)
+        """Return why a file has no keyword; raise DeckError if it is a history."""
+        head = self.read(0, _FIRST)
+        refuse_text_history(self.name, head)
         if not head.strip():
             return "the file is empty"
         return "binary data was found" if b"\0" in head else "no keyword was found"

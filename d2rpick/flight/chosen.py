@@ -12,6 +12,7 @@ from d2rpick.flight.flight import (
     BY_ENERGIES,
     MOST_WORK,
     Flight,
+    find_all_seen,
     get_agreement_limit,
     name_source,
 )
@@ -19,13 +20,18 @@ from d2rpick.flight.internal_energy import (
     find_landing_after,
     has_whole_motion,
 )
+from d2rpick.flight.window import (
+    FreeFlight,
+    explain_hole,
+    limit_to_written_states,
+)
+from d2rpick.histories.samples import find_hole_around
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from d2rpick.flight.flight import Seen
     from d2rpick.flight.internal_energy import QuietTime
-    from d2rpick.flight.window import FreeFlight
     from d2rpick.histories.history import History, Samples
 
 # Smallest number of extrema of an energy that vibrates about a level; an energy with fewer must be constant.
@@ -77,7 +83,26 @@ def choose_flight(
         flight = start_flight_at(history, flight, td, after, described)
     if landing is not None:
         flight = end_flight_at(history, flight, td, landing)
-    return _limit_by_supports(history, flight, td)
+    return _limit_by_supports(history, _limit_by_holes(history, flight, td), td)
+
+
+def _limit_by_holes(history: History, flight: Flight, td: float) -> Flight:
+    """Limit a flight to the states that no interval without states separates from td; refuse a td in such an interval.
+
+    A flight that the user gives is not limited.
+    """
+    hole = find_hole_around(history.holes, td)
+    if hole and not flight.refusal:
+        return flight._replace(refusal=explain_hole(hole, td))
+    if flight.start is None or flight.refusal or flight.source == "given":
+        return flight
+    first, last = flight.within(history.time)
+    shown = FreeFlight(first, last, None, end_seen=flight.end is not None)
+    limited = limit_to_written_states(shown, history.holes, td)
+    assert limited is not None  # Above, a td in an interval without states was refused.
+    return flight._replace(
+        start=limited.start, end=limited.end if limited.end_seen else None
+    )
 
 
 def _limit_by_supports(history: History, flight: Flight, td: float) -> Flight:
@@ -231,8 +256,10 @@ def end_flight_at(
             refusal=None,
             source="given",
             doubts=_add_refusal_to_doubts(flight),
+            shows_contact=shows_contact_at(history, flight, landing),
         )
     doubts = flight.doubts
+    shows_contact = shows_contact_at(history, flight, landing)
     room = get_agreement_limit(history, *flight.within(history.time))
     if (
         flight.end is not None
@@ -245,7 +272,23 @@ def end_flight_at(
             f"{evidence}, before `landing` {landing:.6g}, which is used nevertheless",
         )
         flight = flight._replace(source="given")
-    return flight._replace(end=landing, doubts=doubts)
+    return flight._replace(end=landing, doubts=doubts, shows_contact=shows_contact)
+
+
+def shows_contact_at(history: History, flight: Flight, landing: float) -> bool:
+    """Return False if the record shows that the parts fly on after a ``landing`` given by the user [time].
+
+    The flights that the evidence shows decide or, if it shows none, the ``flight`` itself before it is ended. Its end
+    may differ from the landing as much as the ends of a flight in two sources.
+    """
+    seen = [
+        (window.start, window.end if window.end_seen else inf)
+        for _, window in find_all_seen(history)
+    ]
+    if not seen and flight.start is not None and not flight.refusal:
+        seen = [(flight.start, inf if flight.end is None else flight.end)]
+    room = get_agreement_limit(history, *flight.within(history.time))
+    return not any(start < landing < end - room for start, end in seen)
 
 
 def _is_elsewhere(flight: Flight, td: float, after: float) -> bool:

@@ -11,7 +11,6 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from d2rpick.base.memory import remember
-from d2rpick.flight.momentum import find_complete_stretches
 from d2rpick.histories.history import Given
 from d2rpick.histories.samples import find_window
 
@@ -35,6 +34,9 @@ def restore_parts(history: History, flight: Flight) -> tuple[History, Flight]:
     whole = next((momenta for momenta in written.momenta if not momenta.parts), None)
     if of_parts is None or of_parts.parts is None or whole is None:
         return history, flight
+    # Imported here to keep start-up fast.
+    from d2rpick.flight.momentum import find_complete_stretches
+
     inside = find_window(of_parts.time, *flight.within(of_parts.time))
     for states in find_complete_stretches(of_parts, whole):
         if states.start <= inside.start and inside.stop <= states.stop:

@@ -17,10 +17,13 @@ from d2rpick.flight.internal_energy import (
 )
 from d2rpick.flight.window import (
     SHORTEST,
+    explain_hole,
     find_all_windows,
     limit_to_unheld,
+    limit_to_written_states,
     list_marks,
 )
+from d2rpick.histories.samples import find_hole_around, find_holes
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -55,7 +58,8 @@ class Flight(NamedTuple):
     [1/time]. ``gravity`` is the acceleration that is assumed to be gravity [length/time^2], see `FreeFlight`.
     ``doubts`` lists contradictions between sources.  For a flight from the energy alone, ``settled`` is the time when
     the energy had settled; the time from there to ``start`` is left unused for safety.  ``described`` is True if one
-    oscillator describes the energy in the flight.
+    oscillator describes the energy in the flight.  ``shows_contact`` is False if the user gave the end and the record
+    shows that the parts fly on, so that the event at the end, such as an airbag that fires, is not in the record.
     """
 
     start: float | None = None
@@ -68,6 +72,7 @@ class Flight(NamedTuple):
     settled: float | None = None
     gravity: float = 0.0
     described: bool = False
+    shows_contact: bool = True
 
     def within(self, time: Samples) -> tuple[float, float]:
         """Return the window of the flight [time]; an unknown end is replaced by the end of the record at times (n,)."""
@@ -121,7 +126,9 @@ class Witness(NamedTuple):
 
     def around(self, moment: float) -> FreeFlight | None:
         """Return the flight around a time; each flight is searched for only once."""
-        return _search_once(self.history, self.source, moment, search=self.search)
+        return _search_once(
+            self.history, self.source, moment, search=self.search, time=self.time
+        )
 
     def flights(self) -> tuple[FreeFlight, ...]:
         """Return all flights in ascending order; they are searched for only once."""
@@ -141,14 +148,25 @@ class Witness(NamedTuple):
 
 @remember
 def _search_once(
-    _: History,
-    _source: str,
+    history: History,
+    source: str,
     moment: float,
     *,
     search: Callable[[float], FreeFlight | None],
+    time: Samples,
 ) -> FreeFlight | None:
     """Return the flight around a time according to one source of evidence in a history."""
-    return search(moment)
+    flight = search(moment)
+    holes = _list_holes(history, source, time=time)
+    return flight and limit_to_written_states(flight, holes, moment)
+
+
+@remember
+def _list_holes(
+    _: History, _source: str, *, time: Samples
+) -> tuple[tuple[float, float], ...]:
+    """Return the intervals without states of a source of evidence [time]."""
+    return find_holes(time)
 
 
 @remember
@@ -238,6 +256,9 @@ def _find_flight_by_evidence(history: History, td: float) -> Seen:
 
 def _explain_refusal(witness: Witness, td: float) -> str:
     """Return the reason why td [time] is not in a flight, even if the momentum alone shows a flight there."""
+    hole = find_hole_around(find_holes(witness.time), td)
+    if hole:
+        return explain_hole(hole, td)
     contradiction = witness.explain_contradiction(td)
     if contradiction:
         return contradiction

@@ -261,7 +261,15 @@ def round_off(history: History) -> float:
     if balance:
         terms += [balance.internal, balance.kinetic]
         terms += [balance.external_work, balance.total]
-    return LAST_DIGIT * find_largest(history.energy, *terms)
+    # A single largest value may be wrong, as in a damaged file.
+    return LAST_DIGIT * max(map(_find_second_largest, (history.energy, *terms)))
+
+
+def _find_second_largest(term: Samples | None) -> float:
+    """Return the largest absolute energy that two states have or exceed [energy]; 0 if there are no two states."""
+    if term is None or term.size < 2:
+        return 0.0
+    return float(np.partition(np.abs(term), -2)[-2])
 
 
 def find_largest(*terms: Samples | None) -> float:

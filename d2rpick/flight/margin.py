@@ -57,7 +57,8 @@ def compute_margin(
 ) -> Margin:
     """Return the margin before the contact that ends a flight: the user's margin or, by default, an estimate.
 
-    The margin is at least 3 % of the flight, and 0 if no contact is seen.
+    The margin is at least 3 % of the flight, and 0 if no contact is seen. If the user gave the end of the flight and
+    the record shows no contact there, only a body that moves towards the ground may reach it earlier.
 
     Parameters
     ----------
@@ -75,11 +76,18 @@ def compute_margin(
     if flight.end is None or flight.start is None:
         return Margin(0.0, "no-contact")
     share = LEAST_MARGIN * (flight.end - flight.start)
-    spread = estimate_landing_spread(history, flight, place, turning)
+    spread = None
+    if (
+        flight.shows_contact
+        or (_compute_front_speed(history, flight, turning) or 0) > 0
+    ):
+        spread = estimate_landing_spread(history, flight, place, turning)
     if spread is None or spread <= share:
         margin = Margin(share, "flight", spread)
     else:
         margin = Margin(spread, "landing", spread)
+    if not flight.shows_contact:
+        return margin
     if is_grazing(history, flight, margin.time):
         grazing = "force"
     elif changes_momentum_little(history, flight):
@@ -107,13 +115,20 @@ def estimate_landing_spread(
     None if neither error is known.
     """
     spread = estimate_spread_of_vibration(history, flight)
-    speed = compute_closing_speed(history, flight)
-    if place is None or speed is None:
+    front = _compute_front_speed(history, flight, turning)
+    if place is None or front is None:
         return spread
-    front = speed + (turning or 0.0)
     if front <= 0:
         return estimate_grazing_spread(history, flight, place)
     return place / front + (spread or 0.0)
+
+
+def _compute_front_speed(
+    history: History, flight: Flight, turning: float | None
+) -> float | None:
+    """Return the speed at which the point of contact approaches the ground [length/time]; None if it is unknown."""
+    speed = compute_closing_speed(history, flight)
+    return None if speed is None else speed + (turning or 0.0)
 
 
 def estimate_grazing_spread(

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from math import inf
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from d2rpick.base.tuples import NamedTuple
+from d2rpick.histories.samples import find_hole_around
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
+    from d2rpick.base.spans import Times
     from d2rpick.histories.history import Samples
     from d2rpick.histories.names import Part
     from d2rpick.histories.surroundings import Surroundings
@@ -297,6 +300,32 @@ def find_all_windows(
             flight = flight._replace(start=start)
         flights.append(flight)
     return tuple(flights)
+
+
+def limit_to_written_states(
+    flight: FreeFlight, holes: Sequence[Times], moment: float
+) -> FreeFlight | None:
+    """Return the piece of a flight around a time that no interval without states interrupts; None in such an interval.
+
+    The parts may have touched something in an interval without states (``holes``), so a flight ends before it.
+    """
+    if find_hole_around(holes, moment):
+        return None
+    start = max((hole_end for _, hole_end in holes if hole_end <= moment), default=-inf)
+    end = min(
+        (hole_start for hole_start, _ in holes if hole_start >= moment), default=inf
+    )
+    return flight._replace(
+        start=max(flight.start, start),
+        end=min(flight.end, end),
+        end_seen=flight.end_seen or end < flight.end,
+    )
+
+
+def explain_hole(hole: Times, td: float) -> str:
+    """Return why td cannot be judged in an interval without states [time]."""
+    start, end = hole
+    return f"there are no states from {start:.6g} to {end:.6g}, around td = {td:.6g}: a restart segment may be missing"
 
 
 def _tighten_window(

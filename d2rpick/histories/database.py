@@ -23,7 +23,12 @@ from d2rpick.histories.names import (
     mark_namesakes,
     resolve_name,
 )
-from d2rpick.histories.samples import STEPS_BACK, find_newest_states, find_window
+from d2rpick.histories.samples import (
+    STEPS_BACK,
+    find_holes,
+    find_newest_states,
+    find_window,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -40,10 +45,8 @@ _MOST_BACK: Final = 0.1
 # Significant digits by number of bytes per value: single precision has 7, and 17 digits preserve every double.
 DIGITS: Final = {4: 7, 8: 17}
 
-# An interval between states that exceeds this multiple of the median interval is a gap in the output [-].
-_LONG = 30.0
-# Number of states whose time steps are compared at a time, so that these states fit into the processor cache.
-_PIECE: Final = 1 << 15
+# Largest number of gaps in the output that are noted.
+_MOST_HOLES: Final = 3
 # Smallest fraction of the times in the coarser of a run's two databases that must occur in the other database [-].
 # Many times coincide even if the output intervals differ, because a solver writes only at the end of a time step.
 _FEWEST = 0.5
@@ -382,9 +385,10 @@ class Legs:
             back = int(np.count_nonzero(time[1:] < time[:-1]))
             steps = time.size - 1
             if back > 1 and back > _MOST_BACK * steps:
-                problem = f"{leg.source}: time steps back at {back} of {steps} states, increasing times were expected"
+                problem = f"{leg.source}: time steps back at {back} of {steps} states"
                 raise FormatError(
-                    f"{problem}; check that this is the time (`time`) and the file is not damaged"
+                    f"{problem}, but increasing times were expected; check that this is the time (`time`) and the file "
+                    "is not damaged"
                 )
         all_times = _join_columns(times)
         keep, notes = find_newest_states(all_times)
@@ -451,23 +455,10 @@ def _count_digits(precision: Precision) -> int:
 
 def _note_holes(time: Samples) -> tuple[str, ...]:
     """Return notes on long intervals without output, which may mean that a restart segment is missing."""
-    if time.size < 4:
-        return ()
-    pieces = (
-        np.diff(time[first : first + _PIECE + 1])
-        for first in range(0, time.size - 1, _PIECE)
-    )
-    shortest, longest = zip(
-        *((piece.min(), piece.max()) for piece in pieces), strict=True
-    )
-    # Output intervals are usually regular, so that there are no gaps to search for.
-    if max(longest) <= _LONG * min(shortest):
-        return ()
-    steps = np.diff(time)
-    holes = np.flatnonzero(steps > _LONG * np.sort(steps)[steps.size // 2])
     return tuple(
-        f"no states between {time[i]:.6g} and {time[i + 1]:.6g}; is a restart segment missing?"
-        for i in holes[:3]
+        f"no states between {start:.6g} and {end:.6g}: a restart segment may be missing; add its files, because no "
+        "flight is assumed across this gap"
+        for start, end in find_holes(time)[:_MOST_HOLES]
     )
 
 
@@ -499,8 +490,8 @@ def check_energy_of_parts(whole: Legs, holder: Legs, energies: Samples) -> None:
     if parts[state] - model[state] > tolerance > 0:
         raise FormatError(
             f"at {holder.part_time[in_parts][state]:.6g} the parts of {holder.source} have an energy of "
-            f"{parts[state]:.6g}, the whole model of {whole.source} has {model[state]:.6g}: "
-            "files of one run were expected; give those of one run"
+            f"{parts[state]:.6g}, and the whole model of {whole.source} has {model[state]:.6g}, "
+            "but files of one run were expected; give the files of one run"
         )
 
 

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any, Final, TypeAlias, TypeVar
 import numpy as np
 
 from d2rpick.base.caching import cached_property
-from d2rpick.base.errors import HistoryError, RangeError
+from d2rpick.base.errors import HistoryError, RangeError, list_names
 from d2rpick.base.memory import Memory, remember
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.histories.digits import format_distinctly
-from d2rpick.histories.samples import find_turns, find_window
+from d2rpick.histories.samples import find_holes, find_turns, find_window
 from d2rpick.histories.surroundings import UNKNOWN, Surroundings
 
 if TYPE_CHECKING:
@@ -34,6 +34,8 @@ LARGEST_ENERGY: Final = 1e150
 _STILL: Final = 1e-6
 # Number of times at which the energy is interpolated in one step; it is small to keep the work arrays small.
 _TOGETHER: Final = 1 << 14
+# Largest number of parts that the name of an energy lists.
+_MOST_NAMED: Final = 5
 
 
 class Precision(NamedTuple):
@@ -333,7 +335,7 @@ class History:
             if not is_finite.all():
                 bad = int(is_finite.argmin())
                 raise HistoryError(
-                    f"{where}: {name} of state {bad + 1} is {values[bad]}, a finite number was expected"
+                    f"{where}: {name} of state {bad + 1} is {values[bad]}, but a finite number was expected"
                 )
         if np.any(time[1:] <= time[:-1]):
             state = int(np.argmax(np.diff(time) <= 0)) + 1
@@ -342,6 +344,14 @@ class History:
             )
         object.__setattr__(self, "time", time)
         object.__setattr__(self, "energy", energy)
+
+    @property
+    def energy_name(self) -> str:
+        """Name of the energy; if it belongs to many parts, only the first of them are named."""
+        parts = [part.name for part in self.parts or () if part not in self.springs]
+        if len(parts) <= _MOST_NAMED:
+            return self.channel
+        return f"internal energy of {list_names(parts, most=_MOST_NAMED)}"
 
     @property
     def momenta(self) -> tuple[Momenta, ...]:
@@ -384,6 +394,11 @@ class History:
     def step(self) -> float:
         """Largest output interval [time], which limits the vibration frequencies that the record resolves."""
         return float(np.max(np.diff(self.time)))
+
+    @cached_property
+    def holes(self) -> tuple[tuple[float, float], ...]:
+        """Intervals without states, such as those of a missing restart segment, in ascending order [time]."""
+        return find_holes(self.time)
 
     @property
     def turns(self) -> Samples:
@@ -445,6 +460,34 @@ class History:
         verb = "reaches" if any(low <= time <= high for time in times) else "lies"
         raise RangeError(
             f"{', '.join(self.source)}: {described} {verb} outside the record, {first} to {last}{hint}"
+        )
+
+    def check_pair(self, tr: float, td: float, place: str = "") -> None:
+        """Raise RangeError if both times of a pair lie outside the record and fit it in a smaller unit.
+
+        The message begins with the ``place`` of the pair, such as a file; without one, it names the arguments.
+        """
+        low, high = self.time[0], self.time[-1]
+        if low <= tr <= high or low <= td <= high:
+            return
+        from d2rpick.histories.digits import find_smaller_unit
+
+        unit, values = find_smaller_unit(self.time, (tr, td))
+        if not unit:
+            return
+        first_tr, first_td, first, last = format_distinctly((tr, td, low, high))
+        record = f"outside the record of {', '.join(self.source)}, {first} to {last}"
+        asked = f"were they meant in {unit}? Then give"
+        if place:
+            problem = (
+                f"{place}: tr = {first_tr} and td = {first_td} lie {record}; {asked}"
+            )
+            raise RangeError(
+                f"{problem} {values[0]:g} {values[1]:g}, in the unit of the record"
+            )
+        raise RangeError(
+            f"`tr` {first_tr} and `td` {first_td} lie {record}; {asked} `tr` {values[0]:g} `td` {values[1]:g}, in the "
+            "unit of the record"
         )
 
     def check_length(self, length: float, *, argument: str) -> None:

@@ -239,7 +239,7 @@ def _refuse_several_solvers(kinds: Mapping[str, Sequence[Source]]) -> None:
             f"{name} by {solver}" for solver, name in sorted(files.items())
         )
         raise FormatError(
-            f"{listed} were written by different solvers, files of one run were expected; give the files of one run"
+            f"{listed} were written by different solvers, but files of one run were expected; give the files of one run"
         )
 
 
@@ -326,7 +326,7 @@ def _note_left_out_file(source: Source, refusal: str) -> str:
     reason = (
         refusal.removeprefix(f"{source.name}: ")
         .partition(";")[0]
-        .removesuffix(", an energy history was expected")
+        .removesuffix(", but an energy history was expected")
     )
     return f"{source.name} was left out: {reason}"
 
@@ -421,9 +421,45 @@ def _has_model_and_parts(legs: Sequence[Database]) -> bool:
 
 def _refuse_unknown_channels(databases: Sequence[Legs], selection: Selection) -> None:
     """Raise FormatError if no database has a channel that the user names for a quantity."""
+    with_channels = [database for database in databases if database.channels]
     for quantity, name in selection.channels:
-        if not any(quantity in database.quantities for database in databases):
-            databases[0].find(name)
+        if any(_has_channel(database, name) for database in with_channels):
+            continue
+        option = f"`channels` {quantity}={name}"
+        expected = "the name of a column was expected"
+        if quantity == "mass" and _is_number(name):
+            expected += ", not a value (`mass` takes that of the oscillator model)"
+        if not with_channels:
+            sources = ", ".join(database.source for database in databases)
+            raise FormatError(
+                f"{sources}: {option}: {expected}, and there are only columns of parts"
+            )
+        database = with_channels[0]
+        try:
+            database.find(name)
+        except FormatError as error:
+            problem = str(error).removeprefix(f"{database.source}: ")
+            raise FormatError(
+                f"{database.source}: {option}: {expected}; {problem}"
+            ) from None
+
+
+def _has_channel(database: Legs, name: str) -> bool:
+    """Return True if a name or number selects a channel of a database."""
+    try:
+        database.find(name)
+    except FormatError:
+        return False
+    return True
+
+
+def _is_number(text: str) -> bool:
+    """Return True if a text is a number."""
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
 
 
 def _refuse_time_of_solver(kinds: Sequence[str], time: str | None) -> None:
@@ -463,7 +499,7 @@ def _detect_format(source: Source) -> str:
             "name the glstat, matsum, d3plot or binout of the run"
         )
     raise FormatError(
-        f"{source.name}: binary data of no known format, one of {', '.join(READERS)} was expected; "
+        f"{source.name}: binary data of no known format, but one of {', '.join(READERS)} was expected; "
         "export the energy history as text"
     )
 
@@ -493,7 +529,7 @@ def check_companions(databases: Sequence[Legs]) -> None:
             continue
         if first.span[0] > second.span[1] or second.span[0] > first.span[1]:
             raise FormatError(
-                f"{first.source} and {second.source} have no time in common, files of one run were expected"
+                f"{first.source} and {second.source} have no time in common, but files of one run were expected"
             )
 
 
@@ -557,7 +593,7 @@ def _check_starts(first: Database, second: Database) -> None:
 def _expect_legs(first: Database, second: Database, problem: str) -> FormatError:
     """Return the error for two files that are not restart segments of one run."""
     return FormatError(
-        f"{first.source} and {second.source} {problem}, restart segments of one run were expected; "
+        f"{first.source} and {second.source} {problem}, but restart segments of one run were expected; "
         "give the files of one run"
     )
 

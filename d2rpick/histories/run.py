@@ -25,6 +25,7 @@ from d2rpick.histories.history import (
 from d2rpick.histories.meaning import (
     is_any_internal_energy,
     is_total_internal_energy,
+    note_missed_energy,
     note_other_quantity,
     note_unused_energies,
 )
@@ -42,6 +43,13 @@ from d2rpick.histories.table_parts import (
     find_parts_not_chosen,
     find_springs_not_chosen,
     read_energies_of_parts_not_chosen,
+)
+from d2rpick.histories.wrong_values import (
+    Column,
+    check_balance,
+    check_internal_energy,
+    check_momenta,
+    has_lone_jump,
 )
 
 if TYPE_CHECKING:
@@ -142,6 +150,36 @@ class OpenedRun:
         return replace(
             history, evidence=evidence, surroundings=self.surroundings, notes=notes
         )
+
+    def check_energy(self, history: History) -> None:
+        """Raise HistoryError if a single internal energy of the ``history`` is wrong, as in a damaged file."""
+        if not has_lone_jump(history.energy):
+            return
+        if history.parts is None:
+            balance = history.balance
+            total = balance.kinetic_and_internal if balance else None
+            if balance is None or not np.array_equal(balance.time, history.time):
+                total = None
+            internal = Column(history.channel, history.time, history.energy)
+            check_internal_energy(internal, total, self.files)
+            return
+        total = give_if_written(self._compute_total_of_parts)
+        deforming = [part for part in history.parts if part not in history.springs]
+        for part, energy in zip(
+            deforming, self.part_energies(deforming).T, strict=True
+        ):
+            internal = Column(
+                f"internal energy of part {part.name}", self.part_time, energy
+            )
+            check_internal_energy(internal, total, self.files)
+
+    def _compute_total_of_parts(self) -> Samples:
+        """Return the sum of the internal and kinetic energies of all parts (n,) [energy], or raise FormatError."""
+        energies = (
+            self.part_energies(self.parts),
+            self.part_kinetic_energies(self.parts),
+        )
+        return np.asarray(np.sum(energies, axis=(0, 2)))
 
     def unused_energies(self, selection: Selection) -> tuple[str, ...]:
         """Return notes on table channels that look like energies but are neither selected nor recognised."""
@@ -441,7 +479,7 @@ class OpenedRun:
                 f"{list_names(channels) or 'there are no channels'}"
             )
         sum_of_parts = self._of_parts(self.parts)
-        note = "the energies of all parts were added, those that stay deformable among them; choose with `parts`"
+        note = "the energies of all parts were added, including parts that stay deformable; choose with `parts`"
         return replace(
             sum_of_parts,
             channel="internal energy of all parts",
@@ -456,7 +494,10 @@ class OpenedRun:
             raise FormatError(f"{self.name}: an energy is given twice; name each once")
         columns = [database.channel(name) for name in names]
         channel = " + ".join(names)
-        notes = note_other_quantity(channel)
+        notes = (
+            *note_other_quantity(channel),
+            *note_missed_energy(names, database.channels),
+        )
         energy = columns[0] if len(columns) == 1 else np.sum(columns, axis=0)
         return self._history_of(
             database, database.time, energy, channel, names, notes, None
@@ -519,7 +560,10 @@ class _Written(Given):
     @cached_property
     def momenta(self) -> tuple[Momenta, ...]:
         """Momenta of the parts, followed by that of the whole model."""
-        return self._run.momenta(self._chosen, self._flying)
+        found = self._run.momenta(self._chosen, self._flying)
+        for momenta in found:
+            check_momenta(momenta, self._run.files)
+        return found
 
     @cached_property
     def masses(self) -> Samples | None:
@@ -552,7 +596,10 @@ class _Written(Given):
         """Energies of the whole model."""
         from d2rpick.histories.balance import read_terms
 
-        return read_terms(self._run.databases)
+        balance = read_terms(self._run.databases)
+        if balance:
+            check_balance(balance, self._run.files)
+        return balance
 
     def displacements(self, ids: Sequence[int]) -> NodeMotion | None:
         """Return the displacements of the requested nodes that the files contain; None if they contain none of them."""

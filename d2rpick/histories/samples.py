@@ -10,7 +10,7 @@ from d2rpick.base.errors import FormatError
 from d2rpick.base.tuples import NamedTuple
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
@@ -24,6 +24,17 @@ STEPS_BACK: Final = "time steps back"
 FEWEST_TIMES: Final = 3
 # Largest ratio of the output intervals before and after a restart [-]; unsorted tables and curves exceed it.
 _ALIKE = 2.0
+# An interval without states exceeds this multiple of the median interval and of the intervals beside it [-].
+_LONG: Final = 30.0
+# Smallest number of states among which an interval without states is recognised.
+_FEWEST_AROUND_HOLE: Final = 4
+# Number of states whose time steps are compared at a time, so that these states fit into the processor cache.
+_PIECE: Final = 1 << 15
+# Smallest number of changes from state to state that can be told from noise.
+_FEWEST_OF_NOISE: Final = 40
+# _STRONGEST: fraction of the spectral lines that are treated as the strongest [-].
+# _POWER_OF_LINES: smallest fraction of the power in these lines if a vibration causes it [-]; white noise has 0.4.
+_STRONGEST, _POWER_OF_LINES = 0.1, 0.6
 # Number of adjacent windows that form one window on the next level of the search table.
 _TOGETHER: Final = 8
 # A root has converged if its time changes by at most this fraction [-], which is about the rounding error.
@@ -94,6 +105,45 @@ def remove_line(time: Samples, values: Samples) -> Samples:
     columns = centred.T
     columns -= np.multiply.outer(t @ centred / (t @ t), t)
     return np.asarray(centred)
+
+
+def find_holes(time: Samples) -> tuple[tuple[float, float], ...]:
+    """Return the intervals without states, such as those of a missing restart segment, in ascending order [time].
+
+    Such an interval is much longer than the usual ones and than those beside it: if a run is written less often for a
+    while, the intervals beside each other are alike.
+
+    Examples
+    --------
+    >>> find_holes(np.array([*range(50), *range(100, 150)], dtype=float))
+    ((49.0, 100.0),)
+    >>> find_holes(np.array([*range(50), *range(100, 1000, 50)], dtype=float))
+    ()
+    """
+    if time.size < _FEWEST_AROUND_HOLE:
+        return ()
+    pieces = (
+        np.diff(time[first : first + _PIECE + 1])
+        for first in range(0, time.size - 1, _PIECE)
+    )
+    shortest, longest = zip(
+        *((piece.min(), piece.max()) for piece in pieces), strict=True
+    )
+    # Output intervals are usually regular, so that there are no holes to search for.
+    if max(longest) <= _LONG * min(shortest):
+        return ()
+    steps = np.diff(time)
+    beside = np.maximum(np.append(0.0, steps[:-1]), np.append(steps[1:], 0.0))
+    usual = float(np.sort(steps)[steps.size // 2])
+    holes = np.flatnonzero(steps > _LONG * np.maximum(beside, usual))
+    return tuple((float(time[hole]), float(time[hole + 1])) for hole in holes)
+
+
+def find_hole_around(
+    holes: Sequence[tuple[float, float]], moment: float
+) -> tuple[float, float] | None:
+    """Return the interval without states that contains a time [time]; None if a state is written near it."""
+    return next(((start, end) for start, end in holes if start < moment < end), None)
 
 
 def find_newest_states(time: Samples) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
@@ -175,7 +225,7 @@ def check_one_run(time: Samples, place: Callable[[int], str]) -> Samples:
     else:
         cure = "sort the rows, or put each curve into its own file"
     raise FormatError(
-        f"{problem}, increasing times or one restart were expected; {cure}"
+        f"{problem}, but increasing times or one restart were expected; {cure}"
     )
 
 
@@ -275,6 +325,27 @@ def find_turns(energy: Samples) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
     moving = np.flatnonzero(slope)
     turn = np.flatnonzero(np.diff(slope[moving]))
     return moving[turn] + 1, slope[moving[turn]] > 0
+
+
+def changes_at_random(energy: Samples) -> bool:
+    """Return True if the changes of an energy from state to state are noise rather than a fast vibration.
+
+    A vibration has its power in few spectral lines. Noise has it in all lines, so that its strongest lines hold little
+    of it. ``energy`` has shape (n,).
+
+    Examples
+    --------
+    >>> states = np.arange(1000)
+    >>> changes_at_random(np.cos(2.1 * states)), changes_at_random(np.random.default_rng(1).random(1000))
+    (False, True)
+    """
+    changes = np.diff(energy)
+    if changes.size < _FEWEST_OF_NOISE:
+        return False
+    window = np.hanning(changes.size)
+    power = np.abs(np.fft.rfft((changes - changes.mean()) * window)) ** 2
+    strongest = np.sort(power)[-round(_STRONGEST * power.size) :]
+    return float(strongest.sum()) < _POWER_OF_LINES * float(power.sum())
 
 
 def _compare_sides(values: Samples, limits: Samples | float) -> NDArray[np.int8]:

@@ -31,7 +31,7 @@ from d2rpick.report.figures import (
     mark_span,
 )
 from d2rpick.report.figures_modal import draw_halfway, draw_residuals
-from d2rpick.report.situation import label_deformation, label_energy, name_energy
+from d2rpick.report.situation import label_deformation, label_energy
 from d2rpick.report.study import shorten_names
 from d2rpick.report.view import (
     ReplayedMotion,
@@ -238,7 +238,7 @@ def _draw_energy(
         *drawn,
         color=REFERENCE,
         linewidth=1,
-        label=make_plain_text(name_energy(history)),
+        label=make_plain_text(history.energy_name),
     )
     axes.axhline(
         level, color=SWITCHED, linewidth=0.8, label=f"level at td, {level:.4g}"

@@ -204,16 +204,14 @@ def _name_next_step(checks: Checks) -> str:
     if serious:
         worst = min(serious, key=lambda finding: finding.severity.rank)
         explain = tables.quote_shell_line(("d2rpick", "rule", worst.rule))
-        return (
-            f"correct what the lines above report; {explain} explains the worst of them"
-        )
+        return f"correct the findings above; {explain} explains the most severe one"
     switching = [result for result in checks.results if result.windows]
     itself = next(filter(_switches_at_unknown_times, checks.results), None)
     if itself:
         folder = tables.make_positional([os.path.dirname(itself.deck) or os.curdir])  # noqa: PTH120  a name with a NUL byte has no folder
         follow = tables.quote_shell_line(("d2rpick", "follow", *folder))
         return (
-            f"run the deck; {follow} shows meanwhile when the parts fly and are rigid"
+            f"run the deck; meanwhile, {follow} shows when the parts fly or are rigid"
         )
     has_cards = any(result.cards for result in checks.results)
     if not has_cards or not any(

@@ -135,8 +135,8 @@ CANDIDATE: Final = row(
         "kind",
         KIND,
         "how tr was found: crossing (the energy crosses its level at td), extremum (extremum of the energy near this "
-        "level), match (deformation of several modes similar to td), or start (start of a flight in which nothing "
-        "vibrates)",
+        "level), match (the deformations of several modes are similar to their deformations at td), or start (start "
+        "of a flight in which nothing vibrates)",
     ),
     Field("energy", "number", "internal energy at tr"),
     Field("level_ratio", "number?", "E(tr)/E(td)"),
@@ -286,7 +286,8 @@ QUALITY: Final = (
 )  # fmt: skip
 EXPECTED: Final = Field("expected", maybe(row(
     Field("mean_energy", "number", "mean of the energy in the flight"),
-    Field("resting_energy", get_kind("number", minimum=0), "lowest energy in the flight: the static energy"),
+    Field("resting_energy", get_kind("number", minimum=0), "lowest energy in the flight: an upper bound of the static "
+                                                           "energy"),
     Field("kinetic_share", SHARE, "estimated kinetic fraction K at td"),
     Field("ratio", "size?", "mean energy after td divided by the mean energy of the reference run, for the "
                             "recommended tr"),
@@ -298,12 +299,14 @@ HEALTH: Final = Field("health", maybe(row(
     Field("part_hourglass_share", "size?", "hourglass energy of the worst of the chosen parts, relative to the peak "
                                            "internal energy of this part"),
     Field("part", maybe(row(*PART.fields)), "the chosen part with the largest part_hourglass_share"),
-    Field("energy_ratio_min", "number?", "smallest ratio of the total energy to initial energy and external work"),
-    Field("energy_ratio_max", "number?", "largest ratio of the total energy to initial energy and external work"),
+    Field("energy_ratio_min", "number?", "smallest ratio of the total energy to the sum of initial energy and "
+                                         "external work"),
+    Field("energy_ratio_max", "number?", "largest ratio of the total energy to the sum of initial energy and external "
+                                         "work"),
     Field("sliding_share", "size?", "contact energy, without friction energy if the file lists it separately"),
     Field("negative_sliding_share", "size?", "largest negative contact energy, as a positive number"),
     Field("eroded_share", "size?", "energy of eroded elements"),
-    Field("window", "span?", "interval to which the keys window_... refer: the rigid window, or the flight"),
+    Field("window", "span?", "interval to which the window_... keys refer: the rigid window, or the flight"),
     Field("window_sliding", "size?", "change of the contact energy in the window, relative to the mean energy of the "
                                      "chosen parts in the window"),
     Field("window_work", "size?", "external work in the window beyond gravity and damping, relative to the mean "
@@ -314,8 +317,8 @@ HEALTH: Final = Field("health", maybe(row(
     Field("window_reason", "text?", "reason why the work in the window is not judged"),
     Field("until", "number?", "time up to which the run was checked: td, or the end of the run for info"),
     name="health", later=("part_hourglass_share", "part", "until"),
-)), "health of the reference run up to td, in info of the whole record; energies relative to the peak internal "
-    "energy of the model, null if the files do not contain them")  # fmt: skip
+)), "health of the reference run: info checks the whole record, the other commands check it up to td. Energies are "
+    "relative to the peak internal energy of the model; null if the files do not contain them")  # fmt: skip
 
 
 class Read(Protocol):

@@ -121,9 +121,7 @@ def name_step_to_card(
     is_radioss = SOLVERS[find_solver(history.format)].switches == "node"
     is_chosen = question.parts or "--energy" in question.options
     if flying and not is_chosen and not is_radioss:
-        again = "verify" if command == "card" else command
-        line = write_command(question, again, *question.times, new_parts=[_FLYING])
-        return f"choose the parts to switch, for example those that fly, with {line}"
+        return name_step_to_parts(question, "verify" if command == "card" else command)
     # Only `card` accepts parts that the history does not contain.
     if command != "card" and (history.parts or is_radioss):
         words = (*question.times, "-f", "card")
@@ -157,6 +155,12 @@ def name_step_to_card(
     else:
         line = write_command(question, command, *words)
     return f"print the cards with {line}{hint}"
+
+
+def name_step_to_parts(question: RepeatedQuestion, command: str) -> str:
+    """Return the step that repeats a ``command`` with the parts that fly instead of the whole model."""
+    line = write_command(question, command, *question.times, new_parts=[_FLYING])
+    return f"choose the parts to switch, for example those that fly, with {line}"
 
 
 def _name_bodies(
@@ -226,7 +230,9 @@ def _name_step_to_better_record(
         line = write_command(_allow_deck(question), "suggest", *words)
         without = _ADD_COLUMNS if history.format in ("csv", "hdf5") else ""
         return f"judge the run with its deck: {line}{deck.hint}{without}"
-    return f"improve the record: {decision.cure}; no pair of it can be used before"
+    return (
+        f"improve the record: {decision.cure}; until then, no pair from it can be used"
+    )
 
 
 def add_step_to_copy(
@@ -252,13 +258,18 @@ def add_step_to_copy(
 def ask_for_states_that_show_flight(states: int, start: float, end: float) -> str:
     """Return the advice to write more states if those of a record are too few to show a flight; otherwise empty."""
     # Imported here, because a card without a history needs no numpy.
-    from d2rpick.choice.pair.quality import ENOUGH_STATES
+    from d2rpick.choice.pair.few_states import ENOUGH_STATES
 
     if states >= ENOUGH_STATES:
         return ""
     interval = (end - start) / ENOUGH_STATES
-    more = f"write the states every {interval:.2g} or more often"
-    return f"{more}, because {states} states may miss a flight; if no flight is found even then, "
+    often = f"every {interval:.2g} or more often" if interval else "more often"
+    may_miss = "1 state shows" if states == 1 else f"{states} states may miss"
+    what = "no flight" if states == 1 else "a flight"
+    return (
+        f"continue the run if it has not reached a flight, or write the states {often}, because {may_miss} {what}; "
+        "if no flight is found even then, "
+    )
 
 
 def name_lack_of_pairs(question: RepeatedQuestion) -> str:
@@ -303,6 +314,7 @@ def name_step_without_flight(history: History, question: RepeatedQuestion) -> st
     """Return the step if no flight is found; the end of the load is asked for unless the momentum shows no flight."""
     # Imported here, because a card without a history needs no numpy.
     from d2rpick.flight.flight import NEVER_FLIES, denies_every_flight
+    from d2rpick.histories.samples import find_holes
 
     more = ask_for_states_that_show_flight(
         history.time.size, history.start, history.end
@@ -311,6 +323,14 @@ def name_step_without_flight(history: History, question: RepeatedQuestion) -> st
     if not history.energy.any():
         return f"choose the internal energy as `energy`; {line} names the columns"
     look = f"see what the run has to write with {line}"
+    if history.energy.min() == history.energy.max():
+        return (
+            f"choose parts that deform or another energy, because the energy is {history.energy[0]:.6g} in all states; "
+            f"{line} names what the files contain"
+        )
+    if holes := find_holes(history.time):
+        first, last = holes[0]
+        return f"add the files of the restart segment that is missing between {first:.6g} and {last:.6g}"
     if not denies_every_flight(history):
         return f"{more}{look}, or give the end of the load as --after"
     no_pair = f"{more}{name_lack_of_pairs(question)}: {NEVER_FLIES}"
@@ -339,7 +359,21 @@ def name_way_out_of_run(
     if situation.history.parts:
         line = write_command(question._replace(parts=()), "parts")
         return f"{no_pair} with these parts; find other parts with {line}"
-    return f"{no_pair}: run it without switching, or make other parts rigid"
+    more = _ask_for_states_that_show_peaks(situation.history)
+    return f"{no_pair}: {more}run it without switching, or make other parts rigid"
+
+
+def _ask_for_states_that_show_peaks(history: History) -> str:
+    """Return the advice to write more states if those of a record are too few to show its peaks; otherwise empty."""
+    # Imported here, because a card without a history needs no numpy.
+    from d2rpick.choice.pair.few_states import ENOUGH_STATES
+
+    states = history.time.size
+    if states >= ENOUGH_STATES:
+        return ""
+    interval = history.duration / ENOUGH_STATES
+    more = f"write the states every {interval:.2g} or more often"
+    return f"{more}, because {states} states may miss a peak; if this does not help, "
 
 
 def name_step_after_switched_run(question: RepeatedQuestion) -> str:
@@ -474,4 +508,4 @@ def name_step_after_first(folder: str) -> str:
     files = make_positional([folder])
     check = quote_shell_line(("d2rpick", "check", *files))
     follow = quote_shell_line(("d2rpick", "follow", *files))
-    return f"check the deck with {check}, and run it; {follow} shows meanwhile when the parts fly and are rigid"
+    return f"check the deck with {check}, and run it; meanwhile, {follow} shows when the parts fly or are rigid"

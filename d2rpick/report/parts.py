@@ -105,7 +105,7 @@ PART: Final = row(
     Field(
         "kind",
         maybe(one_of("deformable", "rigid", "spring", "airbag", "void", "particles")),
-        "behaviour of the part, from its elements and material; null without a deck",
+        "type of the part, derived from its elements and material; null without a deck",
     ),
     Field("mass", "number?", "mass; null if unknown"),
     Field(
@@ -138,7 +138,7 @@ PART: Final = row(
     Field(
         "merge_with",
         "integer?",
-        "lead part of the rigid body that this part must join; null for other verdicts than merge",
+        "lead part of the rigid body that this part must join; null for verdicts other than merge",
     ),
     Field("reasons", "texts", "reasons for the verdict"),
 )
@@ -303,8 +303,8 @@ DOCUMENT: Final = Document(
                     Field(
                         "flights",
                         many(_IN_FLIGHT),
-                        "values of the part in each flight, in the order of flights; the same keys of the part itself "
-                        "refer to the longest flight",
+                        "values of the part in each flight, in the order of the list flights; the keys with the same "
+                        "names in parts[] refer to the longest flight",
                     ),
                 )
             ),
@@ -448,7 +448,10 @@ def list_verdict_on_set(answer: Parts) -> list[tuple[str, str]]:
     best = answer.recommended
     if best is None and not answer.files.parts:
         return [
-            ("make rigid", "unknown: this history does not contain single parts"),
+            (
+                "make rigid",
+                "unknown: the history contains no data for individual parts",
+            ),
             ("to improve", _NAME_HISTORY_WITH_PARTS),
         ]
     if best is None and answer.inventory is None:
@@ -585,7 +588,7 @@ def list_page_remarks(answer: Parts) -> list[tuple[str, str]]:
         grows = f"may grow {much} while these parts are rigid"
         cures = (
             f"the cards limit it to 1/{CAP_SHARE} of the rigid time (--step-cap sets another limit); "
-            "to include its gain in the saving, give --step-ratio"
+            "to include the longer time step in the saving, give --step-ratio"
         )
         lines.append(("time step", f"{grows}; {cures}"))
     errors = [part_set.position_error for part_set in answer.sets]

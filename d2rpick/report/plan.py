@@ -108,7 +108,7 @@ WINDOW: Final = row(
     Field(
         "certain",
         "flag",
-        "true if the evidence for the flight excludes contacts and loads",
+        "true if the evidence for the flight rules out contacts and loads",
         lambda row: row.flight.certain,
     ),
     Field(
@@ -173,7 +173,8 @@ WINDOW: Final = row(
     Field(
         "margin_source",
         maybe(one_of("given", "flight", "landing", "grazing", "no-contact")),
-        "source of the margin: given, 3 % of the flight, the shift that a switch may cause, or a grazing contact",
+        "source of the margin: --margin (given), 3 % of the flight (flight), the shift that a switch may cause "
+        "(landing), a grazing contact (grazing); no-contact if there is no next contact, and therefore no margin",
         _make_margin_getter("source"),
     ),
     Field(
@@ -287,7 +288,7 @@ def give_plan_sentence(plan: RunPlan) -> str:
     share = format_rigid_share(plan.rigid_fraction, plan.history)
     if _uses_only_poor_windows(plan):
         return f"{use}: rigid {spans}, {share}, is planned only because of `min_quality` poor"
-    text = f"{use}: make rigid {spans}, {share}"
+    text = f"{use}: make the parts rigid {spans}, {share}"
     if plan.run_time_share is not None:
         text += f"; saves {format_saved_share(plan.run_time_share)}"
     if not waiting:

@@ -25,18 +25,10 @@ def describe_input(history: History) -> str:
     """Return files, format, energy and time span of a history; without a time unit, say that it is that of the run."""
     unit = f" {history.time_unit}" if history.time_unit else " (units of the run)"
     description = (
-        f"{', '.join(history.source)}: {history.format}, {name_energy(history)}"
+        f"{', '.join(history.source)}: {history.format}, {history.energy_name}"
     )
     span = f"{history.start:.6g} to {history.end:.6g}{unit}"
     return make_printable(f"{description}, {history.time.size} states, {span}")
-
-
-def name_energy(history: History) -> str:
-    """Return the name of the energy; if it belongs to many parts, only the first of them are named."""
-    parts = [part.name for part in history.parts or () if part not in history.springs]
-    if len(parts) <= _NAMED:
-        return history.channel
-    return f"internal energy of {list_names(parts, most=_NAMED)}"
 
 
 def label_energy(unit: str) -> str:
@@ -84,12 +76,14 @@ def list_situation_heading(
         ("basis", f"{_describe_basis(situation)}{f': {why}' if why else ''}"),
     ]
     if rests_on_assumed_parts(situation.history):
-        assumed = f"the energy is {ASSUMED_PARTS}; the table does not name its parts"
+        assumed = f"d2rpick assumes {ASSUMED_PARTS}; the table does not name its parts"
         lines.insert(1, ("assumes", assumed))
     if flight.start is None:
         lines.append(("flight", "unknown"))
     else:
         end = "no next contact found" if flight.end is None else f"to {flight.end:.6g}"
+        if not flight.shows_contact:
+            end += " (given; the record shows no contact there)"
         parts = [
             part.name if part.title else str(part.id) for part in flight.parts or ()
         ]

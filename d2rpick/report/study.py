@@ -7,14 +7,17 @@ from collections import Counter
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, Final
 
+from d2rpick.base.errors import list_names, make_printable
 from d2rpick.choice.pair.grades import GOOD, GRADES, POOR, VERDICTS
 from d2rpick.choice.pair.quality import grade_residual
 from d2rpick.choice.runs.study import (
+    NAMED,
     OK,
     Spread,
     StudyOfRuns,
     StudyRow,
     describe_end_of_record,
+    explain_left_out,
     find_cut_runs,
     find_repeated_runs,
     format_number_of_runs,
@@ -32,7 +35,7 @@ from d2rpick.report.fields import (
     write_csv,
 )
 from d2rpick.report.formats import RepeatedQuestion
-from d2rpick.report.next_step import write_command
+from d2rpick.report.next_step import name_step_to_parts, write_command
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -75,6 +78,11 @@ PLAIN: Final = row(
     Field("cure", "text?", "how to improve the pair; empty for a good pair", later=True),
     Field("better_td", "number?", "td of a better pair; null if none is known", later=True),
     Field("energy_unit", "text", "unit of the energies; empty if no file contains it", later=True),
+    Field("energy", "text?", "name of the energy by which the run was judged; it lists at most 5 parts", later=True),
+    Field("parts", maybe(many("integer")), "numbers of the parts whose energies were added; null for the whole model, "
+                                           "or for columns", later=True),
+    Field("is_unchosen", "flag?", "true if this is the energy of the whole model because no part or energy was chosen, "
+                                  "although the files show which parts fly", later=True),
 )  # fmt: skip
 _ERROR: Final = Field(
     "common_error", "number?",
@@ -100,9 +108,9 @@ _SHARED: Final = row(
           lambda answer: answer.spread or dict.fromkeys(_EXTENTS)),
     Field("agree", "flag?", "true if the intervals from tr_low to tr_high of these runs overlap"),
     Field("common_tr", "number?",
-          "median of tr, or the time nearest to it within all intervals, if the runs agree. Otherwise the earliest tr "
-          "that is admissible in every run with status ok or none, and within the timing tolerance of each, if there "
-          "is such a tr", lambda answer: answer.common.tr),
+          "if the runs agree, the median of tr, or the nearest time that lies in all intervals; otherwise the "
+          "earliest tr that is admissible in every run with status ok or none, and within the timing tolerance of "
+          "each of them; null if there is none", lambda answer: answer.common.tr),
     Field("common_verdict", maybe(keys.VERDICT),
           "what to do with common_tr: the verdict for the worst run, from its own pair and from its error at "
           "common_tr",
@@ -276,18 +284,44 @@ def list_outcome(answer: StudyOfRuns) -> list[tuple[str, str]]:
     if common.tr is not None and common.window:
         errors = [error for error in common.errors if error is not None]
         heading = VERDICTS[answer.grade] if answer.grade else heading
-        runs = f"{answer.judged} of {format_number_of_runs(len(answer.runs))}"
+        # A run that was given twice counts once.
+        repeated = _count_repetitions(answer)
+        different = answer.judged - repeated
+        runs = f"{different} of {format_number_of_runs(len(answer.runs) - repeated)}"
+        if repeated:
+            runs += " (repeated runs count once)"
         # Nothing is common to a single run.
-        name = "tr" if answer.judged == 1 else "common tr"
+        name = "tr" if different == 1 else "common tr"
         shared = f"{name} = {common.tr:g}, for {runs}, {_name_error(answer)} {_format_error_span(errors)}"
         shared += f"; as good: every tr from {format_window(*common.window)}"
     return [
         (heading, shared),
         ("each run", _count_verdicts(answer)),
+        *_list_left_out(answer),
         *_list_repetitions(answer),
+        *_list_judged_energies(answer),
         ("td", describe_td(answer)),
         ("own tr", own_tr),
     ]
+
+
+def _list_judged_energies(answer: StudyOfRuns) -> list[tuple[str, str]]:
+    """Return a line with the energies by which the runs were judged, and the number of runs if they differ."""
+    descriptions = [_describe_energy(row) for row in answer.runs if row.energy]
+    if not descriptions:
+        return []
+    # Formats name the same energy with spaces or underscores.
+    counts = Counter(text.replace("_", " ") for text in descriptions)
+    if len(counts) == 1:
+        return [("judged", descriptions[0])]
+    texts = [f"{text} in {format_number_of_runs(n)}" for text, n in counts.items()]
+    return [("judged", list_names(texts, most=NAMED, between="; "))]
+
+
+def _describe_energy(row: StudyRow) -> str:
+    """Return the name of the energy by which a run was judged; if nothing was chosen, say how to choose parts."""
+    energy = make_printable(row.energy or "")
+    return f"{energy}, not that of chosen parts (--part)" if row.is_unchosen else energy
 
 
 def _describe_spread(spread: Spread, *, overlaps: bool) -> str:
@@ -314,9 +348,23 @@ def _format_error_span(errors: Sequence[float]) -> str:
     return low if low == high else f"{low} to {high}"
 
 
+def _count_repetitions(answer: StudyOfRuns) -> int:
+    """Return the number of runs that have the same content as an earlier run."""
+    return sum(len(group) - 1 for group in find_repeated_runs(answer.runs))
+
+
+def _list_left_out(answer: StudyOfRuns) -> list[tuple[str, str]]:
+    """Return the first run that could not be judged, with the reason; empty if all or none could be judged."""
+    rows = [row for row in answer.runs if not row.judged]
+    if not rows or not answer.judged:
+        return []
+    more = f"; {len(rows) - 1} more in the table" if len(rows) > 1 else ""
+    return [("left out", f"{explain_left_out(rows[0])}{more}")]
+
+
 def _list_repetitions(answer: StudyOfRuns) -> list[tuple[str, str]]:
     """Describe how many runs have the same content as another run; empty if all runs differ."""
-    count = sum(len(group) - 1 for group in find_repeated_runs(answer.runs))
+    count = _count_repetitions(answer)
     if not count:
         return []
     have = "has" if count == 1 else "have"
@@ -340,7 +388,7 @@ def _count_verdicts(answer: StudyOfRuns) -> str:
     return ", ".join(
         [
             *counted,
-            *[f"no pair in {format_number_of_runs(undecided_count)}"]
+            *[f"no verdict in {format_number_of_runs(undecided_count)}"]
             * (undecided_count > 0),
         ]
     )
@@ -384,6 +432,7 @@ def list_next_step(
 ) -> list[tuple[str, str]]:
     """Return the next command: to one td for all runs, to the verdict on the common pair, or to the worst run.
 
+    If the energy of the whole model was judged although the files show which parts fly, the parts are chosen first.
     If every run has a usable pair but no tr is common to all of them, each run can have its own tr and td. The td of
     one run is not offered to the others, because their pairs there were not judged and may be unusable.
     """
@@ -391,18 +440,19 @@ def list_next_step(
     if not judged:
         first = RepeatedQuestion(files=question.files[:1])
         return [("next", f"look at the first run with {write_command(first, 'info')}")]
+    if any(row.is_unchosen for row in judged):
+        return [("next", name_step_to_parts(question, "study"))]
     worst = min(judged, key=lambda row: GRADES.index(row.quality or POOR))
     of_worst = question._replace(files=(worst.source,))
     better_td = _find_shared_better_td(answer)
     if worst.quality == POOR and better_td is not None:
-        readable = tuple(row.source for row in answer.runs if row.judged)
-        of_readable = question._replace(files=readable)
+        of_readable = question._replace(files=_list_different_runs(answer))
         line = write_command(of_readable, "study", "--td", f"{better_td:.6g}")
         step = f"judge all runs at the better td with {line}"
     elif worst.quality == POOR:
         line = write_command(of_worst, "suggest", *question.times)
         step = f"look at the first of the worst runs with {line}"
-    elif len(judged) == 1:
+    elif len(judged) - _count_repetitions(answer) == 1:
         line = write_command(of_worst, "suggest", *question.times)
         step = f"look at the run that was judged with {line}"
     elif answer.common.tr is None:
@@ -414,8 +464,7 @@ def list_next_step(
         )
     elif answer.td is None:
         earliest = min(row.td for row in judged if row.td is not None)
-        readable = tuple(row.source for row in answer.runs if row.judged)
-        of_readable = question._replace(files=readable)
+        of_readable = question._replace(files=_list_different_runs(answer))
         line = write_command(of_readable, "study", "--td", f"{earliest:.6g}")
         step = f"choose one td for all runs, for example the earliest, with {line}"
     else:
@@ -423,6 +472,16 @@ def list_next_step(
         line = write_command(of_worst, "verify", *times)
         step = f"judge the common pair in the worst run with {line}"
     return [("next", step)]
+
+
+def _list_different_runs(answer: StudyOfRuns) -> tuple[str, ...]:
+    """Return the names of the judged runs, each content once."""
+    repeated = {
+        id(row) for group in find_repeated_runs(answer.runs) for row in group[1:]
+    }
+    return tuple(
+        row.source for row in answer.runs if row.judged and id(row) not in repeated
+    )
 
 
 def _find_shared_better_td(answer: StudyOfRuns) -> float | None:

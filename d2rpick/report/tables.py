@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from operator import gt
 from typing import TYPE_CHECKING, Any, Final
@@ -19,6 +20,8 @@ Rows = "Iterable[Sequence[Cell]]"
 # _LEAST: in a table that is still too wide, words of more characters than this are split. All numbers are shorter.
 _WORD: Final = 32
 _LEAST: Final = 12
+# Pattern of a word that cmd and PowerShell pass on unchanged without quotes.
+_PLAIN_ON_WINDOWS: Final = r"[\w./\\:=+-]+"
 # _NUMBER: pattern of a number, which is not treated as a spreadsheet formula.
 # _FORMULA: pattern of a spreadsheet formula, which begins with =, +, -, @ or the full-width form of one of these.
 # A formula may follow a semicolon, because some spreadsheets use it to separate the cells of a CSV file.
@@ -370,11 +373,15 @@ def as_json(result: Any, indent: int | None = 2) -> str:
 def quote_shell_line(words: Iterable[str]) -> str:
     r"""Quote words with printable characters only, so that bash, zsh and POSIX.1-2024 shells read them back unchanged.
 
+    On Windows, the words are quoted for cmd and PowerShell.
+
     Examples
     --------
     >>> print(quote_shell_line(["d2rpick", "info", "my run.csv", "it's\n\udcff"]))
     d2rpick info 'my run.csv' $'it\'s\012\377'
     """
+    if os.name == "nt":
+        return quote_windows_line(words)
     import shlex  # Imported here to keep start-up fast.
 
     return " ".join(
@@ -383,6 +390,27 @@ def quote_shell_line(words: Iterable[str]) -> str:
         else f"$'{''.join(map(_escape_letter, word))}'"
         for word in words
     )
+
+
+def quote_windows_line(words: Iterable[str]) -> str:
+    r"""Quote words with double quotes, so that programs started by cmd and PowerShell read them back.
+
+    PowerShell would split an unquoted word at a comma.
+
+    Examples
+    --------
+    >>> print(quote_windows_line(["d2rpick", "plan", "--part", "1,2", "C:\\my run\\", "runs\\a"]))
+    d2rpick plan --part "1,2" "C:\my run\\" runs\a
+    """
+    return " ".join(map(_quote_windows_word, words))
+
+
+def _quote_windows_word(word: str) -> str:
+    """Return a word in double quotes, unless no shell changes it; the backslashes before a quote are doubled."""
+    if re.fullmatch(_PLAIN_ON_WINDOWS, word):
+        return word
+    escaped = re.sub(r'(\\*)"', r'\1\1\\"', make_printable(word))
+    return '"{}"'.format(re.sub(r"(\\+)$", r"\1\1", escaped))
 
 
 def make_positional(names: Sequence[str]) -> tuple[str, ...]:

@@ -109,7 +109,9 @@ def as_table(trade_off: TradeOff, display: DisplayOptions) -> str:
     ]
     hidden_count = len(trade_off.offers) - len(listed_offers)
     if hidden_count:
-        lines.append(f"... and {hidden_count} more td (--limit; csv and json have all)")
+        lines.append(
+            f"... and {hidden_count} more values of td (raise --limit, or use -f csv or -f json)"
+        )
     input_lines = [
         ("history", describe_input(trade_off.situation.history)),
         ("td", window),
@@ -307,12 +309,13 @@ DOCUMENT: Final = Document("d2rpick/explore/2", "Answer of d2rpick explore; time
     Field("answer", "text", "summary of the answer in one sentence", give_answer),
     Field("recommended", maybe(keys.TIMES), "recommended pair; null if there is none"),
     Field("start", "number?",
-          "td with which the others are compared: the given td, otherwise the td with the largest saving",
+          "td with which the other values are compared: the given td or, if none is given, the td with the largest "
+          "saving",
           lambda trade_off: trade_off.start and trade_off.start.td),
     Field("step", "number?",
-          "nearest energy peak with at most half of the error at start and at least half of its rigid time, or nearest "
-          "Pareto-optimal td with these properties if no peak has them. If there is neither, the recommended td, if "
-          "its error is smaller than at start",
+          "td to which the answer points: the nearest energy peak with at most half of the error at start and at "
+          "least half of the rigid time at start; if there is no such peak, the nearest Pareto-optimal td with these "
+          "properties; otherwise the recommended td, if its error is smaller than the error at start; else null",
           lambda trade_off: trade_off.step and trade_off.step.td),
     Field("offers", many(OFFER),
           "evenly spaced values of td, the peaks of the energy, the given td and the recommended td, by ascending td"),
@@ -358,6 +361,8 @@ def _describe_cost_change(start: Offer, step: Offer) -> str:
         return "costs no rigid time"
     if change < 0:
         return f"costs {-change:.1%} of the rigid time"
+    if change >= 1:
+        return f"makes the rigid time {change + 1:.3g} times as long"
     return f"makes the rigid time {change:.1%} longer"
 
 

@@ -43,7 +43,8 @@ MEASURES: Final = row(
     Field(
         "td_ok",
         "flag?",
-        "true if td lies in the flight, and the kinetic fraction K is small enough; null if K is unknown",
+        "true if td lies in the flight and the kinetic fraction K does not exceed its limit (0.5, or "
+        "--max-kinetic-share); null if K is unknown",
     ),
     Field(
         "verified",
@@ -67,8 +68,8 @@ SWITCHED: Final = row(
     Field("momentum_error", "size?",
           "largest deviation of the momentum after td, relative to the largest momentum of the reference run after td"),
     Field("displacement", "size?", "largest distance between the centres of the parts in the two runs after td"),
-    Field("rigid_from", "number?", "first time at which the energy of the switched run is constant in the window; null "
-                                   "if it is not constant"),
+    Field("rigid_from", "number?", "time from which the energy of the switched run is constant in the window; null if "
+                                   "it is not constant"),
     Field("rigid_to", "number?", "last time at which this energy is constant"),
     Field("objections", "texts", "reasons why the comparison failed; empty if it passed"),
     Field("notes", "texts", "what was left out or assumed when the switched run was read, and anomalies of this run"),
@@ -88,8 +89,8 @@ DOCUMENT: Final = Document("d2rpick/verify/2", "Answer of d2rpick verify; times 
 ))  # fmt: skip
 # Step after a comparison within the limits of a pair that cannot be used.
 _USE_MOTION_OF_SWITCHED_RUN: Final = (
-    "use at most the motion of this switched run, because nothing shows that its vibration after td is right; "
-    "`min_quality` poor accepts it"
+    "use at most the motion of this switched run, up to the next contact, because nothing shows that its vibration "
+    "after td is right; `min_quality` poor accepts it"
 )
 COMPARED = ("", "switched", "reference")
 
@@ -103,7 +104,7 @@ def as_table(answer: PairVerdict, display: DisplayOptions) -> str:
         *list_pair_verdict(answer),
         *list_next_step(answer, display),
     ]
-    lines = tables.format_in_line(place_comparison(answer, verdict_lines))
+    lines = tables.format_in_line([*list_comparison(answer), *verdict_lines])
     if answer.switched:
         lines += ["", *_format_comparison(answer.switched)]
     listed = [*list_pair_evidence(answer), *above, *remarks]
@@ -131,10 +132,17 @@ def list_next_step(
     question = display.question
     decision = answer.decision
     situation = answer.situation
-    if decision.verdict == DO_NOT_USE:
+    if answer.is_of_other_run:
+        line = write_command(question, "info")
+        step = (
+            f"look at both runs with {line} and the same command for the switched run"
+        )
+    elif decision.verdict == DO_NOT_USE:
         if answer.switched and not answer.switched.objections:
-            otherwise = _USE_MOTION_OF_SWITCHED_RUN
-        elif decision.best_of or situation.flight.start is None:
+            return add_step_to_copy(
+                situation.history, [("next", _USE_MOTION_OF_SWITCHED_RUN)]
+            )
+        if decision.best_of or situation.flight.start is None:
             otherwise = name_step_after_flight(situation, decision, question)
         else:
             line = write_command(question, "explore", "--td", f"{answer.td:.6g}")
@@ -186,21 +194,11 @@ def _name_usable_results(answer: PairVerdict) -> str:
     return f"use the results of the switched run{care}"
 
 
-def place_comparison(
-    answer: PairVerdict, verdict_lines: list[tuple[str, str]]
-) -> list[tuple[str, str]]:
-    """Return the lines of a verdict with that of the comparison, which is first only if the two agree."""
-    compared = list_comparison(answer)
-    if answer.switched and _contradicts_verdict(answer.switched, answer.decision):
-        decision, reason, *others = verdict_lines
-        return [decision, reason, *compared, *others]
-    return [*compared, *verdict_lines]
-
-
 def list_comparison(answer: PairVerdict) -> list[tuple[str, str]]:
     """Return a row with its name: whether the switched run agrees with the reference run; none without such a run.
 
-    If the pair is not to be used although no limit is exceeded, the row states only which values are within limits.
+    If the pair is not to be used although no limit is exceeded, the row states that the computed run compares well, and
+    what this does not show.
     """
     switched = answer.switched
     if switched is None:
@@ -208,7 +206,11 @@ def list_comparison(answer: PairVerdict) -> list[tuple[str, str]]:
     compared = ", ".join(_list_limited_values(switched))
     is_within = _contradicts_verdict(switched, answer.decision)
     if is_within:
-        verdict = "within limits"
+        verdict = "within limits, although the pair was poor"
+    elif switched.objections and _are_values_within_limits(switched):
+        verdict = (
+            "failed for the reason below, although these values are within their limits"
+        )
     elif switched.objections:
         verdict = "failed"
     else:
@@ -246,6 +248,17 @@ def _describe_missing_energy(switched: Comparison, decision: Decision) -> str:
 def _contradicts_verdict(switched: Comparison, decision: Decision) -> bool:
     """Return True if the comparison exceeds no limit, but the pair is not to be used."""
     return not switched.objections and decision.verdict == DO_NOT_USE
+
+
+def _are_values_within_limits(switched: Comparison) -> bool:
+    """Return True if values are compared and none exceeds its limit, so that the comparison failed otherwise."""
+    within = []
+    if switched.has_energy and switched.mean_after is not None:
+        ratio = switched.mean_after / switched.mean_after_reference
+        within.append(switched.min_mean <= ratio <= 2 - switched.min_mean)
+    if switched.momentum_error is not None:
+        within.append(switched.momentum_error <= MOST_MOMENTUM_ERROR)
+    return bool(within) and all(within)
 
 
 def _list_limited_values(switched: Comparison) -> list[str]:
@@ -331,7 +344,7 @@ def as_markdown(answer: PairVerdict, display: DisplayOptions) -> str:
     switched = answer.switched
     verdict_lines = [*list_pair_verdict(answer), *list_next_step(answer, display)]
     paragraphs = tables.format_as_list(
-        (*place_comparison(answer, verdict_lines), *list_pair_evidence(answer))
+        (*list_comparison(answer), *verdict_lines, *list_pair_evidence(answer))
     )
     table = tables.as_markdown(("measure", "value"), list_known_measures(answer))
     if switched:
@@ -392,7 +405,7 @@ def list_deviations(switched: Comparison) -> list[tuple[str, str]]:
     rows = []
     if error is not None:
         rows.append(
-            ("largest error of the momentum after td", f"{error:.2g} of its maximum")
+            ("largest momentum error after td", f"{error:.2g} of the largest momentum")
         )
     if displacement is not None:
         rows.append(("largest displacement after td", f"{displacement:.3g}"))
@@ -408,7 +421,7 @@ def _format_comparison(switched: Comparison) -> list[str]:
     return [
         f"switched run  {make_printable(', '.join(switched.source))}; compared from td to {switched.end:.6g}",
         *([tables.as_text(COMPARED, values)] if values else []),
-        *(f"{name.ljust(38)}  {text}" for name, text in list_deviations(switched)),
+        *(f"{name.ljust(31)}  {text}" for name, text in list_deviations(switched)),
         *(f"note: {make_printable(note)}" for note in switched.notes),
     ]
 

@@ -43,6 +43,13 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "assumes that it is. If it is another load, the parts do not fly freely.",
             "Give the deck with --deck, or write the mass, or the kinetic and internal energy.",
         ),
+        "landing-not-shown": Explanation(
+            "The record shows that the parts fly on after the landing that you gave. What happens there is not in the "
+            "record: an airbag that fires, or a contact of another variant. d2rpick does not know its energy, so it "
+            "grades the vibration after td by its error alone, as with --keep-vibration.",
+            "Nothing to do for such an event. For a contact of this run, give the time at which the force begins, or "
+            "omit --landing.",
+        ),
         "grazing-contact": Explanation(
             "The body only grazes another surface at the end of the flight. If the body is slightly out of place, "
             "this contact may come much earlier.",
@@ -72,7 +79,7 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "the margin with --margin.",
         ),
         "td-after-contact": Explanation(
-            "The next contact begins before td, or td lies within the margin before it. The parts would hit something "
+            "The next contact begins before td, or td lies within the margin before it. The parts may hit something "
             "while they are rigid.",
             "Choose an earlier td.",
         ),
@@ -94,8 +101,8 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "Compare other values of td with d2rpick explore, or choose other parts.",
         ),
         "no-candidate": Explanation(
-            "No tr is admissible for this td: each lies outside the flight, has the opposite direction, or has too "
-            "large an error. The warning gives the reason for the nearest candidate.",
+            "No tr is admissible for this td: each candidate lies outside the flight, has a deformation of opposite "
+            "direction, or has too large an error. The warning gives the reason for the best candidate.",
             "Omit --td, compare other values of td with d2rpick explore, or choose other parts.",
         ),
         "flight-outside-record": Explanation(
@@ -110,7 +117,8 @@ EXPLANATIONS_BY_TOPIC: Final = {
         ),
         "out-of-place": Explanation(
             "A part that moves inside the body is frozen in the position that it has at tr. At td the body is "
-            "displaced by the stated length, which is more than 1 % of its path. The next contact shifts.",
+            "displaced by the stated distance, which is more than 1 % of its path. The next contact may come earlier "
+            "or later.",
             "Leave the moving part deformable, or choose another tr. You may accept the displacement if no result "
             "depends on the exact time and place of the next contact.",
         ),
@@ -120,8 +128,8 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "Use --part to name the parts that were switched together.",
         ),
         "plastic-or-preload": Explanation(
-            "Plastic work and a preload explain this energy equally well. The pair is the same in both cases, but "
-            "the direction of the deformation may differ.",
+            "Plastic work and a preload explain the static energy of this record equally well. The recommended pair "
+            "is the same in both cases, but the direction of the deformation may differ.",
             "Nothing to do unless the parts are preloaded. In that case compare with a finished switched run (verify "
             "--switched).",
         ),
@@ -140,7 +148,7 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "period is half a period of the vibration.",
         ),
         "engine-wrong-energy": Explanation(
-            "The listing shows a version of OpenRadioss before January 2026. This version writes wrong internal "
+            "The listing shows a version of OpenRadioss from before January 2026. Such versions write wrong internal "
             "energies after a switch in a restart.",
             "Do not use the energies of this run. Run the model again with a newer version.",
         ),
@@ -184,7 +192,7 @@ EXPLANATIONS_BY_TOPIC: Final = {
         ),
         "eroded-energy": Explanation(
             "Eroded elements contain a significant part of the internal energy. This energy is not released at td.",
-            "Name single parts with --part, or use a history without the eroded energy.",
+            "Name individual parts with --part, or use a history without the eroded energy.",
         ),
         "erosion": Explanation(
             "Elements erode inside the rigid window. If their parts are rigid, these elements do not erode.",
@@ -259,9 +267,9 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "Nothing to do if it is the deck of this run. Otherwise give another deck with --deck, or use --no-deck.",
         ),
         "deck-not-followed": Explanation(
-            "There are two possible causes. If d2rpick cannot evaluate an item of the deck, such as a curve or a "
-            "sensor, it uses the history instead. If the deck already contains switching cards, the answer does not "
-            "consider them.",
+            "Either d2rpick cannot evaluate an item of the deck, such as a curve or a sensor, and uses the history "
+            "instead; or the deck already contains switching cards, which the answer does not consider. The warning "
+            "names the line.",
             "Check the named line. If it is a load, give its end with --after.",
         ),
         "deck-of-another-model": Explanation(
@@ -284,8 +292,8 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "Omit --merge to keep them separate.",
         ),
         "moves-apart": Explanation(
-            "A part flies away from the other parts, so nothing holds it. In one rigid body with them, its motion "
-            "would be wrong.",
+            "A part flies away from the other parts, so nothing holds it. If the parts became one rigid body, the "
+            "motion of this part would be wrong.",
             "Leave the part out of --part, or switch it as a separate body.",
         ),
         "no-angle": Explanation(
@@ -312,6 +320,11 @@ EXPLANATIONS_BY_TOPIC: Final = {
         "parts-not-in-deck": Explanation(
             "Parts of the history are missing from the deck, so their costs and connections are unknown.",
             "Give the deck of this run, with all its include files.",
+        ),
+        "lead-part-unknown": Explanation(
+            "The card merges the parts into a lead part that the history does not contain. LS-DYNA stops with an error "
+            "if the model has no such part.",
+            "Give the deck with --deck, so that d2rpick checks the card, or give a part of the model with --merge.",
         ),
         "parts-not-joined": Explanation(
             "The card makes several parts rigid, each as a separate rigid body. If they share nodes, they must form "
@@ -342,7 +355,7 @@ EXPLANATIONS_BY_TOPIC: Final = {
         ),
         "unreadable-deck": Explanation(
             "d2rpick cannot read the deck, so it checks nothing in it.",
-            "Correct what the message names.",
+            "Correct the error that the message names.",
         ),
         "unswitchable-part": Explanation(
             "The solver cannot make this part rigid, or its results would be wrong. The warning gives the reason.",
@@ -367,7 +380,7 @@ EXPLANATIONS_BY_TOPIC: Final = {
     },
     "Plans": {
         "done-without-flight": Explanation(
-            "A window of --done lies in no flight of this run, so the landing after it is unknown.",
+            "A window of --done does not lie in any flight of this run, so the landing after it is unknown.",
             "Check that the file of --done and the history belong to the same switched run.",
         ),
         "landed-rigid": Explanation(
@@ -376,14 +389,15 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "Choose an earlier td for this window, and run the model again.",
         ),
         "longer-window-later": Explanation(
-            "A later flight allows a longer window than the one that is planned now. The later window needs a new run "
-            "first.",
+            "A later flight allows a longer window than the window that is planned now. The later window needs a new "
+            "run first.",
             "To plan the longer window first, set --min-rigid to a value between the two lengths.",
         ),
         "rigid-times": Explanation(
-            "d2rpick found an interval in which the parts were rigid, and does not use it as a flight of a reference "
-            "run.",
-            "Use a reference run, or give the windows with --done.",
+            "This record is that of a switched run: parts were rigid in the stated interval, which d2rpick does not "
+            "use as a flight of a reference run. What the window froze also changes the vibration after it.",
+            "Choose times from the reference run. To plan the later windows of the switched run, use d2rpick plan "
+            "--done.",
         ),
     },
     "Many runs": {
@@ -397,15 +411,21 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "Give each run once. Check whether a file was copied to the wrong folder.",
         ),
         "internal-error": Explanation(
-            "An error in d2rpick occurred for this input. d2rpick judged the other inputs.",
+            "An internal error of d2rpick prevented a verdict on this input. d2rpick judged the other inputs.",
             "Please report the error with the output of --debug.",
         ),
         "mixed-bases": Explanation(
-            "The choice has a different basis in different runs, so their errors are not directly comparable.",
+            "The basis is not the same in all runs, so the errors of the runs are not directly comparable.",
             "Compare the verdicts, or write the same output in all runs.",
         ),
+        "mixed-parts": Explanation(
+            "The runs were judged by the energies of different parts. The common tr then belongs to different switches "
+            "in different runs.",
+            "Name the same parts for all runs by their numbers with --part.",
+        ),
         "mixed-units": Explanation(
-            "The runs have different time units, but td is a single value.",
+            "The runs have different time units, by their files or because the times of some are 1000 times those of "
+            "others. A study has one unit for td and tr.",
             "Convert the runs to one unit, or study the runs of each unit separately.",
         ),
         "runs-left-out": Explanation(

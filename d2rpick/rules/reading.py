@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import list_names
@@ -36,6 +37,8 @@ if TYPE_CHECKING:
     from d2rpick.rules.by_sensor import Sensed
 
 _MOST_LISTED: Final = 8
+# Gap between two values of a line with columns, inside a text that was read as one field.
+_BETWEEN_COLUMNS: Final = r"\S {2,}\S"
 _CURES: Final = {
     "no such file": "add the file or its *INCLUDE_PATH",
     UNKNOWN_KIND: "check that file separately",
@@ -85,7 +88,7 @@ def _make_elements(keyword: str) -> Example:
     ]
 )
 @make_rule_decorator(
-    "D2R001", ERROR, "the rows after a card do not match its D2R/R2D counts"
+    "D2R001", ERROR, "the lines after a card do not match its D2R and R2D counts"
 )
 def _check_counts(case: Case) -> Iterator[PlacedMessage]:
     """The second line of *DEFORMABLE_TO_RIGID_AUTOMATIC gives the number of D2R lines (D2R) and of R2D lines (R2D) that
@@ -148,8 +151,7 @@ def _check_fields(case: Case) -> Iterator[PlacedMessage]:
             f"{head!r} is not a switching keyword, so its lines were not read; did you mean {near}?",
         )
     for card in case.sets:
-        for field, problem in card.problems:
-            yield field, f"{problem}; check its columns and its parameters"
+        yield from _list_unreadable_fields(card)
     if case.sets:
         for field, problem in (*case.parts.problems, *_find_unreadable_members(case)):
             yield field, f"{problem}; it is needed to know which parts are switched"
@@ -159,6 +161,25 @@ def _check_fields(case: Case) -> Iterator[PlacedMessage]:
                     value.field,
                     f"{value.problem}; *{card_of_time.name} is needed to judge the switching times",
                 )
+
+
+def _list_unreadable_fields(card: SwitchSet) -> Iterator[PlacedMessage]:
+    """Yield the unreadable fields of a switching card; of a line with a decimal comma only the first."""
+    lines_with_comma = set()
+    for field, problem in card.problems:
+        if not re.search(_BETWEEN_COLUMNS, field.text):
+            yield field, f"{problem}; check its columns and its parameters"
+            continue
+        if field.line not in lines_with_comma:
+            lines_with_comma.add(field.line)
+            words = " ".join(field.text.split())
+            yield (
+                field,
+                (
+                    f"{words!r} is not a number: because of a comma in this line, its fields are not read by columns; "
+                    "write decimal numbers with a point, 0.012 for 0,012"
+                ),
+            )
 
 
 def _find_unreadable_members(case: Case) -> Iterator[Problem]:
@@ -311,7 +332,8 @@ def _check_truncation(case: Case) -> Iterator[PlacedMessage]:
     without *END whose last lines are nodes or elements may be truncated too. The last number may be incomplete, and
     switching cards, parts or parameters may be missing. d2rpick parts computes no cost from a truncated mesh.
 
-    Fix: Copy or write the file again. If the file is complete, add *END (Radioss: /END) or a line end.
+    Fix: Copy or write the file again. If the file is complete, add *END (Radioss: /END), or end the last line with a
+    line break.
     """
     for block, problem in find_cuts(case.deck):
         yield (
@@ -463,9 +485,9 @@ def _report_inertias(case: Case) -> Iterator[PlacedMessage]:
     "switching cards on standard input without parts: ids are not checked",
 )
 def _report_missing_parts(case: Case) -> Iterator[PlacedMessage]:
-    """A file that contains only switching cards is meant to be included by another deck, and is checked with it. Cards
-    from standard input, as in d2rpick card ... | d2rpick check -, come without a deck, so d2rpick cannot check that
-    their parts exist.
+    """A file that contains only switching cards is meant to be included in another deck, and d2rpick checks it together
+    with that deck. Cards from standard input, as in d2rpick card ... | d2rpick check -, come without a deck, so d2rpick
+    cannot check that their parts exist.
 
     Fix: Paste the cards into the deck, or include them there, and check the main deck.
     """

@@ -134,10 +134,10 @@ def _find_switching_legs(case: RunCase) -> list[RadiossLeg]:
     (RADIOSS,),
 )
 def _check_order(case: RunCase) -> Iterator[PlacedMessage]:
-    """Each engine file continues the run from the end of the previous engine file. The files are numbered from 1
-    without gaps, their /RUN lines have the same name, and no file ends before the previous file. Otherwise d2rpick
-    cannot determine when a part is rigid. Two engine files with the same end time are not reported. Source: Altair's
-    help for /RUN, and runs computed with OpenRadioss.
+    """Each engine file continues the run from the end of the previous engine file. The files must be numbered from 1
+    without gaps, and their /RUN lines must have the same name. No file may end before the previous file. Otherwise
+    d2rpick cannot determine when a part is rigid. Two engine files with the same end time are not reported. Source:
+    Altair's help for /RUN, and runs computed with OpenRadioss.
 
     Fix: Add the missing engine files, and correct their numbers, run names and end times.
     """
@@ -188,8 +188,8 @@ def _check_order(case: RunCase) -> Iterator[PlacedMessage]:
 def _check_main_nodes(case: RunCase) -> Iterator[PlacedMessage]:
     """/RBODY/ON and /RBODY/OFF list the main nodes of rigid bodies, not the ids of the bodies. The engine skips any
     other node without a message, so the part does not change its state. It also skips the main node of a body that
-    /MERGE/RBODY merges into another body. This rule does not report a 0. d2rpick applies this rule only if it could
-    read the starter deck and its includes. Source: Altair's help and the published source of OpenRadioss.
+    /MERGE/RBODY merges into another body. This rule ignores an entry of 0. It applies only if d2rpick could read the
+    starter deck and its includes. Source: Altair's help and the published source of OpenRadioss.
 
     Fix: List the main node of the rigid body, or of the body into which it is merged.
     """
@@ -419,10 +419,10 @@ def _report_flaws(case: RunCase, *, code: str) -> Iterator[PlacedMessage]:
     (RADIOSS,),
 )
 def _check_left_rigid(case: RunCase) -> Iterator[PlacedMessage]:
-    """A rigid body is active from time 0 unless the first engine file has /RBODY/OFF for it. All its nodes stay rigid
-    to the end of the run, for example the wheels of a car if the engine files list only the main node of the car body.
-    A body is reported if it contains whole parts and no history shows whether these deform (D2R409 reports bodies
-    whose parts deform). Source: Altair's help for /RBODY in engine files, and runs computed with OpenRadioss.
+    """A rigid body is active from time 0 unless the first engine file has /RBODY/OFF for it. Its parts stay rigid to
+    the end of the run. An example is the wheels of a car, if the engine files list only the main node of the car body.
+    A body is reported if it contains whole parts and no history shows whether these deform (D2R409 reports bodies whose
+    parts deform). Source: Altair's help for /RBODY in engine files, and runs computed with OpenRadioss.
 
     Fix: Add the main node to the /RBODY/OFF of every engine file. If the body is meant to be rigid, silence the finding
     with a comment.
@@ -557,7 +557,8 @@ def _check_velocities(case: RunCase) -> Iterator[PlacedMessage]:
     """The starter gives all nodes of an /RBODY the velocity of its main node, even if the engine deactivates the body
     in the first engine file. If the node group of /INIVEL lacks the main node, the body begins at rest, and the solver
     issues no message. An /INIV in an engine file moves an active body by its main node alone, and an inactive body by
-    its nodes. Velocities that begin later (tstart, a sensor) are not judged. Source: runs computed with OpenRadioss.
+    its nodes. The rule does not evaluate velocities that begin later (tstart, a sensor). Source: runs computed with
+    OpenRadioss.
 
     Fix: Add the main node to the node group of the initial velocity.
     """

@@ -105,14 +105,14 @@ def _check_unique_ids(case: Case) -> Iterator[PlacedMessage]:
 @make_rule_decorator(
     "D2R005",
     ERROR,
-    "RELSW/PAIRED not mutual, not of opposite sign, or CODEs of different families",
+    "paired sets whose RELSW do not name each other, or whose PAIRED or CODE do not belong together",
 )
 def _check_pairs(case: Case) -> Iterator[PlacedMessage]:
     """Paired sets act in turn as a contact or wall force begins and ends. Each set names the other in RELSW. PAIRED is
     1 for the set that acts first and -1 for the other. Their CODEs are 1 and 3 (rigid wall) or 2 and 4 (contact). Sets
     with CODE 3 or 4 on the D2R side and 1 or 2 on the R2D side, paired or not, are the wrong way round: the parts are
-    rigid during the impact and deformable in flight. Source: vendor keyword data for the codes. For months, a public
-    drop tool wrote decks in which CODE 2 and 4 were exchanged.
+    rigid during the impact and deformable in flight. Source: vendor keyword data for the codes. For a long time, a
+    public drop tool wrote decks in which CODE 2 and 4 were interchanged.
 
     Fix: Let RELSW of each set name the other, set PAIRED to 1 and -1, and use CODE 1 or 2 to make parts rigid and CODE
     3 or 4 to make them deformable.
@@ -259,10 +259,10 @@ def _find_force_headers(case: Case, codes: set[int]) -> Iterator[SwitchHeader]:
     "D2R007", ERROR, "ENTNO names no contact or rigid wall of the deck"
 )
 def _check_entity_exists(case: Case) -> Iterator[PlacedMessage]:
-    """CODE 2 and 4 wait for the force of contact ENTNO, CODE 1 and 3 for the force of rigid wall ENTNO. A contact or
-    wall that does not exist never has a force. ENTNO is the id of *CONTACT_..._ID. Contacts without ids are counted in
-    the order of their definition (no available source confirms this). d2rpick applies this rule only if it could read
-    the whole deck and the deck has parts. Source: vendor keyword data.
+    """CODE 2 and 4 wait for the force of contact ENTNO, and CODE 1 and 3 wait for the force of rigid wall ENTNO. A
+    contact or wall that does not exist never has a force. ENTNO is the id of *CONTACT_..._ID. Contacts without ids are
+    counted in the order of their definition (no available source confirms this). d2rpick applies this rule only if it
+    could read the whole deck and the deck has parts. Source: vendor keyword data.
 
     Fix: Set ENTNO to the id of a contact or rigid wall of the deck.
     """
@@ -481,11 +481,11 @@ def _make_landing_deck(wait: str) -> Example:
     "D2R208", WARNING, "a switch by a force that chatters in the history", BOTH
 )
 def _check_chatter(case: Case) -> Iterator[PlacedMessage]:
-    """A contact force begins and ends many times in one impact. If the history has the force of the contact or wall, or
-    if it has the part momenta and the deck has only one contact or wall, d2rpick evaluates the switches over the
-    history. Rigid windows shorter than 10 % of the longest window are not flights but chatter. There is no chatter if
-    TIME3 of the set that makes the parts deformable (Radioss: Tdelay of the sensor) is longer than the contact. d2rpick
-    cannot detect a force that begins and ends within one output interval.
+    """A contact force begins and ends many times in one impact. d2rpick follows the switches through the history if the
+    history contains the force of the contact or wall. Part momenta are enough if the deck has only one contact or wall.
+    Rigid windows shorter than 10 % of the longest window are not flights but chatter. There is no chatter if TIME3 of
+    the set that makes the parts deformable (Radioss: Tdelay of the sensor) is longer than the contact. d2rpick cannot
+    detect a force that begins and ends within one output interval.
 
     Fix: Raise TIME3 (Radioss: Tdelay) to the value in the finding.
     """

@@ -132,7 +132,7 @@ def _check_never_rigid(case: Case) -> Iterator[PlacedMessage]:
 @make_rule_decorator("D2R117", ERROR, "a part made rigid and deformable in one restart")
 def _check_both_ways(case: Case) -> Iterator[PlacedMessage]:
     """*RIGID_DEFORMABLE_D2R and *RIGID_DEFORMABLE_R2D of one restart act together when the restart begins. A part on
-    both cards has no rigid window, or stays rigid to the end. No available source confirms which of the two happens.
+    both cards has no rigid window, or stays rigid to the end; no available source states which.
 
     Fix: Move one of the two cards to another restart.
     """
@@ -173,7 +173,7 @@ def _check_never_back(case: Case) -> Iterator[PlacedMessage]:
         times = [tr for event, tr in opened.items() if event.by is card]
         yield (
             field,
-            f"{unit_names} made rigid at {min(times):g} and never switched back in this deck",
+            f"{unit_names} made rigid at {min(times):g} and never made deformable again in this deck",
         )
 
 
@@ -366,11 +366,12 @@ def _is_rigid_together(case: Case, first: Unit, second: Unit) -> bool:
     "D2R116", WARNING, "solids whose stresses do not rotate with the rigid body", BOTH
 )
 def _check_unturned_stresses(case: Case) -> Iterator[PlacedMessage]:
-    """While a part is rigid, the solver does not compute its elements. Formulations without a co-rotational frame keep
-    their stresses in global axes, so after a rotation they spring back in the wrong direction. Parts that are rigid
-    from the start have no stress, so d2rpick does not report them. Source for Radioss: Altair's help (bricks with
-    Isolid 1 or 2 without Iframe 2, tetrahedra, 16-node thick shells, 20-node bricks; not HEPH or HA8). For LS-DYNA
-    the rule follows from the theory of the formulations; sources disagree on what LS-DYNA does with the stresses.
+    """While a part is rigid, the solver does not compute its elements. Formulations without a co-rotational stress
+    update keep their stresses in global axes, so after a rotation the elements spring back in the wrong direction.
+    Parts that are rigid from the start have no stress, so d2rpick does not report them. Source for Radioss: Altair's
+    help (bricks with Isolid 1 or 2 without Iframe 2, tetrahedra, 16-node thick shells, 20-node bricks; not HEPH or
+    HA8). For LS-DYNA the rule follows from the theory of the formulations; sources disagree on what LS-DYNA does with
+    the stresses.
 
     Fix: Use a co-rotational formulation for these solids, or keep them deformable. If the part rotates little between
     tr and td, the error is small.

@@ -190,8 +190,8 @@ def _check_zero_times(case: Case) -> Iterator[PlacedMessage]:
 def _check_sampling(case: Case) -> Iterator[PlacedMessage]:
     """Switching times are chosen from the internal energy of a reference run: glstat contains the energy of the whole
     model, and matsum contains the energy of each part. If the output interval is too long, the energy at tr and td is
-    not known well enough. A switched run is compared with its reference run by the same output (verify --switched),
-    so the rule applies to checks with --history, too. It does not apply to decks that contain only switching cards.
+    not known well enough. verify --switched compares a switched run with its reference run by means of this output, so
+    the rule also applies to checks with --history. It does not apply to decks that contain only switching cards.
 
     Fix: Add *DATABASE_GLSTAT and *DATABASE_MATSUM with a DT of at most 1/200 of the shortest rigid window.
     """
@@ -495,9 +495,8 @@ def _check_sign(case: Case) -> Iterator[PlacedMessage]:
     BOTH,
 )
 def _check_kinetic_share(case: Case) -> Iterator[PlacedMessage]:
-    """A rigid part does not vibrate, so the kinetic fraction of the vibration energy at td is lost, whatever tr is.
-    Near a maximum of the internal energy hardly any vibration energy is kinetic. If D2R209 reports the pair, this rule
-    does not.
+    """A rigid part does not vibrate, so the kinetic part of the vibration energy at td is lost for every tr. Near a
+    maximum of the internal energy, little vibration energy is kinetic. If D2R209 reports the pair, this rule does not.
 
     Fix: Replace both times by the pair in the finding, or choose a td near a maximum of the internal energy.
     """
@@ -513,9 +512,9 @@ def _check_kinetic_share(case: Case) -> Iterator[PlacedMessage]:
 @set_failing(lambda: [_make_pair_deck(".0128853", "0.064")])
 @make_rule_decorator("D2R209", ERROR, "a pair with a grade below --min-quality", BOTH)
 def _check_quality(case: Case) -> Iterator[PlacedMessage]:
-    """The pair is admissible, but the history shows that the motion or the vibration after td will be wrong, or does
-    not show that they will be right. d2rpick judges the pair in the same way as d2rpick verify. With --min-quality
-    good, it also reports fair pairs; with --min-quality poor, it reports no pair.
+    """The pair is admissible, but according to the history, the motion or the vibration after td will be wrong, or may
+    be wrong. d2rpick judges the pair in the same way as d2rpick verify. With --min-quality good, it also reports fair
+    pairs; with --min-quality poor, it reports no pair.
 
     Fix: Use the pair that the finding names. If it names none, follow its advice.
     """
@@ -528,10 +527,10 @@ def _check_quality(case: Case) -> Iterator[PlacedMessage]:
     "D2R210", ERROR, "a pair beyond a limit, such as --max-residual", BOTH
 )
 def _check_limits(case: Case) -> Iterator[PlacedMessage]:
-    """The pair exceeds a limit that was set by an option, such as --max-residual or --max-kinetic-share, or the history
-    does not show whether it does. With the same limit, d2rpick suggest does not recommend such a pair.
+    """The pair exceeds a limit that an option sets, such as --max-residual or --max-kinetic-share, or the history does
+    not show whether the pair exceeds it. With the same limit, d2rpick suggest does not recommend such a pair.
 
-    Fix: Use the pair that the finding names, or one that d2rpick suggest recommends with this limit.
+    Fix: Use the pair that the finding names, or a pair that d2rpick suggest recommends with this limit.
     """
     return _report_faults(case, "D2R210")
 
@@ -559,9 +558,9 @@ def _check_flight(case: Case) -> Iterator[PlacedMessage]:
     "D2R205", ERROR, "time or part that the history does not contain", BOTH
 )
 def _check_in_history(case: Case) -> Iterator[PlacedMessage]:
-    """The energy outside the history is unknown, and so is the energy of a part that the history does not contain.
-    d2rpick also reports a td within the first ten states if 1000 times this td lies in the history, because this td
-    seems to have another unit.
+    """The history gives no energy at times outside its record, and none for a part that it does not contain. d2rpick
+    also reports a td within the first ten states if 1000 times this td lies in the history, because this td seems to
+    have another unit.
 
     Fix: Correct the time or the part id, or extend the reference run.
     """

@@ -96,14 +96,19 @@ class Commands(NamedTuple):
         given: str | None = getattr(self, program)
         return given or _find_installed(program)
 
+    def list_unknown(self) -> list[str]:
+        """Return the programs that are neither given nor installed."""
+        return [name for name in _PROGRAMS if self._find_template(name) is None]
+
     def _report_unknown_programs(self) -> ConfigurationError:
         """Return the error that names every program whose command is unknown, so that one answer corrects all."""
-        unknown = [name for name in _PROGRAMS if self._find_template(name) is None]
+        unknown = self.list_unknown()
         names = " and no ".join(unknown)
         are = "is" if len(unknown) == 1 else "are"
         options = " and ".join(f"--{name} 'CMD {{deck}}'" for name in unknown)
         return ConfigurationError(
-            f"no {names} {are} known; set {_HOME} to the folder of OpenRadioss, or give {options}"
+            f"no {names} {are} known, so no command can be started or printed; set {_HOME} to the folder of "
+            f"OpenRadioss, or give {options}"
         )
 
     def make_environment(self) -> dict[str, str]:

@@ -12,7 +12,7 @@ from d2rpick.running.checks import refuse_held
 from d2rpick.running.inner_motion import Wait, check_wait, wait_of_deck
 
 if TYPE_CHECKING:
-    from collections.abc import Collection
+    from collections.abc import Collection, Iterator
 
     from d2rpick.deck.model import Inventory
     from d2rpick.deck.printed_card import PrintedCard
@@ -54,32 +54,53 @@ def first_card(
         If the waiting time or the parts are not given and do not follow from the deck.
     """
     inventory = read_inventory(path)
-    chosen = tuple(parts)
-    if inventory.solver == "radioss":
-        chosen = chosen or find_parts_off(read_run(path))
-    if not chosen:
-        is_radioss = inventory.solver == "radioss"
-        lack = (
-            f", and {path} deactivates no rigid body (/RBODY/OFF)" if is_radioss else ""
-        )
-        raise ArgumentError(
-            f"no parts were given{lack}; name those to be switched with `parts`"
-        )
+    chosen = tuple(parts) or _find_default_parts(path, inventory)
     refuse_held(path, inventory, chosen)
+    if needs := [*_list_needs(inventory, bool(chosen), wait)]:
+        raise ArgumentError(f"{path}: missing: {'; '.join(needs)}")
     needed = _choose_wait(path, inventory, wait)
     first_run = FirstRunDeck(path, inventory, chosen, needed.time, needed.reason, after)
     return print_first_run_cards(first_run), needed
 
 
+def list_needs(path: str, has_parts: bool, wait: float | None) -> tuple[str, ...]:
+    """Return the arguments that a first run of a deck needs besides the given ones, with their meanings.
+
+    ``has_parts`` is True if the parts to be switched are given; ``wait`` is the given force-free time [time].
+    """
+    inventory = read_inventory(path)
+    has_parts = has_parts or bool(_find_default_parts(path, inventory))
+    return tuple(_list_needs(inventory, has_parts, wait))
+
+
+def _list_needs(
+    inventory: Inventory, has_parts: bool, wait: float | None
+) -> Iterator[str]:
+    """Yield the missing arguments that do not follow from the deck."""
+    if not has_parts:
+        lack = (
+            "; the deck deactivates no rigid body (/RBODY/OFF) that names them"
+            if inventory.solver == "radioss"
+            else ""
+        )
+        yield f"`parts` (parts to switch{lack})"
+    if wait is None and wait_of_deck(inventory) is None:
+        yield (
+            "`wait` (force-free time that marks a flight, longer than half of the longest natural period of the parts; "
+            "the deck has no masses on linear springs, from which it could be derived)"
+        )
+
+
+def _find_default_parts(path: str, inventory: Inventory) -> tuple[int, ...]:
+    """Return the parts of the rigid bodies that a Radioss run deactivates; empty for LS-DYNA."""
+    return find_parts_off(read_run(path)) if inventory.solver == "radioss" else ()
+
+
 def _choose_wait(path: str, inventory: Inventory, given: float | None) -> Wait:
-    """Return the given waiting time or half of the deck's longest period; raise ArgumentError if neither is known."""
+    """Return the given waiting time, or half of the longest period that the deck contains."""
     of_deck = wait_of_deck(inventory)
     if given is not None:
         check_wait(given, of_deck, path)
         return Wait(given, "given", "as given")
-    if of_deck is None:
-        raise ArgumentError(
-            f"`wait` cannot be derived from {path} (no masses on linear springs found); give the force-free time that"
-            " marks a flight: more than half of the longest natural period of the parts"
-        )
+    assert of_deck is not None  # The missing arguments were refused before.
     return of_deck._replace(time=float(f"{of_deck.time:.3g}"))

@@ -122,12 +122,14 @@ def test_without_a_unit_of_the_run_both_numbers_are_named() -> None:
 
 def test_limits_and_kinds_hold_for_texts_too(tmp_path: Path) -> None:
     run = d2.read(write_in(tmp_path, "ms"))
-    with pytest.raises(ValueError, match="margin is -1, a number of at least 0"):
+    with pytest.raises(ValueError, match="margin is -1, but a number of at least 0"):
         d2.suggest(run, td=64, margin="-1ms")
     no_time: Any = "1ms"
-    with pytest.raises(TypeError, match="tolerance is '1ms', a number was expected"):
+    with pytest.raises(
+        TypeError, match="tolerance is '1ms', but a number was expected"
+    ):
         d2.suggest(run, td=64, tolerance=no_time)
-    with pytest.raises(TypeError, match="td is '64mm', a number was expected"):
+    with pytest.raises(TypeError, match="td is '64mm', but a number was expected"):
         d2.suggest(run, td="64mm")
 
 
@@ -152,19 +154,20 @@ def copy_plate(folder: Path, of_deck: str, of_run: str) -> str:
 
 @pytest.mark.parametrize(
     ("units", "unit", "wait"),
-    [(("s", "s"), "s", 0.02), (("ms", "ms"), "ms", 20.0), (("mus", "mus"), "us", 2e4)],
+    [(("s", "s"), "s", 2e-7), (("ms", "ms"), "ms", 2e-4), (("mus", "mus"), "us", 0.2)],
 )
 def test_a_first_run_takes_the_unit_of_its_deck(
     tmp_path: Path, units: tuple[str, str], unit: str, wait: float
 ) -> None:
     deck = copy_plate(tmp_path / "run", *units)
     assert find_time_unit(deck) == unit
-    written = d2.first(deck, tmp_path / "first", parts=1, wait="20ms")
+    written = d2.first(deck, tmp_path / "first", parts=1, wait="0.0002ms")
     assert written.wait == pytest.approx(wait)
     by_number = d2.first(deck, tmp_path / "second", parts=1, wait=wait)
     for name, same in zip(written.files, by_number.files, strict=True):
         assert Path(name).read_bytes() == Path(same).read_bytes()
-    typed = ("first", "--part", "1", "--wait", "20ms", deck, "-o", str(tmp_path / "3"))
+    words = ("first", "--part", "1", "--wait", "0.0002ms")
+    typed = (*words, deck, "-o", str(tmp_path / "3"))
     assert run(*typed).exit_code == 0
 
 

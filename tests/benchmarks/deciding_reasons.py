@@ -71,7 +71,7 @@ _NAMES: Final = {
         flight.margin._FEWEST flight.window.FEWEST flight.window.FEWEST_STATES_OF_WORK flight.vibrating._FEWEST
         vibration.identify.MIN_SAMPLES vibration.identify.MIN_SAMPLES_PER_PERIOD vibration.lines._EVEN
         vibration.modal.FEWEST_STATES
-        choice.pair.situation.FEWEST_STATES choice.pair.quality._NOISE_DEVIATIONS
+        choice.question.FEWEST_STATES choice.pair.quality._NOISE_DEVIATIONS
         """,
     _LOAD: """
         flight.contact_forces._INNER flight.contact_forces._PIECES flight.contact_forces._RISE

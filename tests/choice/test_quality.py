@@ -16,15 +16,18 @@ from d2rpick.choice.pair.candidates import Candidate
 from d2rpick.choice.pair.grades import GRADES
 from d2rpick.choice.pair.quality import (
     EQUALLY_GOOD,
+    Cause,
     Errors,
     Grade,
     Quality,
     count_states_per_period,
     grade_pair,
+    list_causes_of_record,
     list_exceeded_limits,
     order_by_quality,
     rank_candidates,
     rank_judged,
+    trust_measured_momentum,
 )
 from d2rpick.choice.pair.situation import examine_td
 from d2rpick.choice.question import Settings
@@ -435,7 +438,7 @@ def test_a_tr_that_is_not_known_to_its_tolerance_is_fair() -> None:
     worst = [
         float(
             re.findall(
-                r"At worst: vibration\s+wrong by ([\d.]+)%",
+                r"At worst: vibration\s+error ([\d.]+)%",
                 as_table(answer_of_td, DisplayOptions()),
             )[0]
         )
@@ -553,3 +556,40 @@ def test_a_given_flight_that_the_momentum_contradicts_is_not_advised_again(
     assert "although the momentum shows no free flight" in causes[0].reason
     assert "without `after`" in causes[0].cure
     assert "give the end of the load" not in causes[0].cure
+
+
+def test_a_measured_momentum_answers_the_doubt_about_an_unknown_load() -> None:
+    """A load that the record does not explain acts in both runs; other doubts about the motion remain."""
+    good = Grade("good")
+    load = Cause(
+        "a load acts", "give the deck", is_of_record=True, is_unknown_load=True
+    )
+    apart = Cause("the parts fly apart", "switch fewer parts")
+    for causes, grade in (
+        ((load,), "fair"),
+        ((load, apart), "poor"),
+        ((apart,), "poor"),
+    ):
+        quality = Quality(Grade("poor", causes), good, good)
+        assert trust_measured_momentum(quality).motion.grade == grade
+    trusted = trust_measured_momentum(Quality(Grade("poor", (load,)), good, good))
+    assert trusted.reasons == (
+        "a load acts, but the momentum of the computed run agrees",
+    )
+
+
+@pytest.mark.parametrize("noise", [0.0, 1.0])
+def test_noise_is_not_blamed_on_the_output_interval(noise: float) -> None:
+    """The energy has 5 states per period, or seems to because of its noise, which no shorter interval removes."""
+    time = np.arange(600) * 1e-3
+    fast = np.cos(np.pi / 5 * time / 1e-3) ** 2
+    slow = np.cos(np.pi / 200 * time / 1e-3) ** 2
+    random = np.random.default_rng(3).standard_normal(time.size)
+    energy = 20 + (slow + 1.5 * random if noise else fast)
+    history = History(time, energy, source=("run",), format="csv", channel="E")
+    (cause,) = list_causes_of_record(history, None, 0.5)
+    if noise:
+        assert cause.reason.startswith("noise hides the vibration")
+        assert "write the energies more often" not in cause.cure
+    else:
+        assert cause.reason.startswith("the energy has 5")

@@ -470,6 +470,20 @@ def test_different_bases_and_units_are_told() -> None:
     }
 
 
+def test_runs_judged_by_different_parts_are_told() -> None:
+    rows = [
+        make_study_row("a", (1, 2), parts=(1, 2)),
+        make_study_row("b", (1, 2), parts=(1,)),
+        make_study_row("c", (1, 2), parts=(1, 2)),
+    ]
+    (caution,) = compare_rows(10.0, rows).cautions
+    assert caution.code == "mixed-parts"
+    assert caution.message.endswith("parts 1, 2 in 2 runs, part 1 in 1 run")
+    named = [replace(row, energy=f"energy of {row.parts}") for row in rows]
+    outcome = dict(list_outcome(compare_rows(10.0, named)))
+    assert outcome["judged"] == "energy of (1, 2) in 2 runs; energy of (1,) in 1 run"
+
+
 @given(st.floats(1e-6, 1e3), st.floats(0, 1))
 def test_the_shortest_number_lies_between(low: float, share: float) -> None:
     high = low * (1 + share)

@@ -9,7 +9,7 @@ from d2rpick.base.errors import RangeError
 from d2rpick.base.spans import Times
 from d2rpick.choice.question import Reference, read_reference
 from d2rpick.choice.switched.comparison import Comparison, compare_runs
-from d2rpick.choice.switched.same_model import refuse_other_model
+from d2rpick.choice.switched.same_model import explain_difference, refuse_other_model
 from d2rpick.choice.switched.switch_times import (
     find_switched_windows,
     read_switch_times,
@@ -20,7 +20,7 @@ from d2rpick.choice.switched.switched_run import prepare_switched_history
 from d2rpick.histories.formats import glstat, matsum
 from d2rpick.histories.history import History, Samples
 from d2rpick.histories.opening import Selection
-from tests.command import join_wrapped_lines, run, run_json
+from tests.command import ROOT, join_wrapped_lines, run, run_json
 from tests.computed import locate_stored
 
 TIME = np.linspace(0, 1, 501)
@@ -151,7 +151,7 @@ def test_runs_whose_parts_have_other_titles_are_refused(tmp_path: Path) -> None:
     box = read_run(tmp_path / "box", {"box": SWING})
     car = read_run(tmp_path / "car", {"engine": SWING}, *WINDOWS)
     titles = "part 1 is 'box' in the reference run and 'engine' in the switched run"
-    with pytest.raises(RangeError, match=f"runs of different models: {titles}; give"):
+    with pytest.raises(RangeError, match=f"belong to different models: {titles}; give"):
         refuse_other_model(box.run, car.run)
     refuse_other_model(car.run, car.run)
 
@@ -175,11 +175,48 @@ def test_the_other_model_is_the_only_reason_why_no_window_is_found(
 ) -> None:
     reference = read_run(tmp_path / "reference", {"engine": SWING})
     other = read_run(tmp_path / "other", {"engine": 3 * SWING})
-    with pytest.raises(RangeError, match="different models; give the switched run"):
+    with pytest.raises(
+        RangeError, match=r"not two runs of one model.*; give the switched run"
+    ):
         read_switch_times(other, reference.history, (), None, None)
     same = read_run(tmp_path / "same", {"engine": 1.1 * SWING})
     with pytest.raises(RangeError, match="rigid; give the run with the switching card"):
         read_switch_times(same, reference.history, (), None, None)
+
+
+def test_what_the_files_show_of_two_models_is_the_first_reason(tmp_path: Path) -> None:
+    """Parts and masses decide; a title is only a sign, and another velocity is no other model."""
+    engine = read_run(tmp_path / "reference", {"engine": SWING})
+    both = read_run(tmp_path / "both", {"engine": SWING, "car": SWING})
+    assert explain_difference(engine.run, both.run) == ""
+    bar = read_reference([str(ROOT / "sample_data" / "oscillator" / "OSCT01.gz")])
+    box = read_reference([str(ROOT / "sample_data" / "rolloverT01.gz")])
+    switched = read_reference([locate_stored("rollover_r100_T0*.gz")])
+    assert explain_difference(bar.run, box.run) == (
+        "the runs belong to different models (the mass of part 1 'bar' is 0.00157 in the reference run and 374.4 in "
+        "the switched run)"
+    )
+    assert explain_difference(box.run, switched.run) == (
+        "the loads or velocities differ, but the masses of the parts do not"
+    )
+
+
+def test_an_unlike_run_is_the_first_reason_against_a_given_pair(tmp_path: Path) -> None:
+    options = ("--t-end", "0.3", "--dt", "1e-4", "--stiffness", "660e3", "--mass")
+    reference, other = (str(tmp_path / f"{name}.glstat") for name in ("ref", "other"))
+    times = ("--tr", "0.06", "--td", "0.09")
+    run("replay", *options, "31.4", "--beta", "2", "--v0", "6", "-o", reference)
+    run("replay", *options, "31.4", "--beta", "2", "--v0", "4", *times, "-o", other)
+    result = run("verify", *times, "--switched", other, reference)
+    assert result.exit_code == 1
+    text = join_wrapped_lines(result.stdout)
+    assert (
+        "why these are not two runs of one model with the same loads and velocities: the energies of the two runs "
+        "differ by 56% before 0.06, when both are deformable (kinetic energy at 0: "
+        in text
+    )
+    assert "to improve give the switched run of this model" in text
+    assert f"next look at both runs with d2rpick info {reference}" in text
 
 
 def make_history(energy: Samples) -> History:
@@ -209,9 +246,13 @@ def test_a_wrong_energy_of_rigid_solids_is_not_that_of_another_model(
     switched = SWING.copy()
     switched[select_states(0.3, 0.5)] = wrong
     comparison = compare(switched, (0.3 + late, 0.5))
-    assert not [text for text in comparison.objections if "different models" in text]
+    assert not [
+        text for text in comparison.objections if "not two runs of one model" in text
+    ]
     different = compare(np.where(TIME < 0.2, 2 * SWING, switched), (0.3, 0.5))
-    assert [text for text in different.objections if "different models" in text]
+    assert [
+        text for text in different.objections if "not two runs of one model" in text
+    ]
 
 
 def test_energies_that_the_solver_reports_wrongly_are_not_compared() -> None:

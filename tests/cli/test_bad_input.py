@@ -40,7 +40,7 @@ def replace_line(number: int, line: str) -> bytes:
 
 # Files that are not histories: content, further arguments, and parts of the message.
 FILES = {
-    "empty": (b"", (), ["input: the file is empty", "has the run been started?"]),
+    "empty": (b"", (), ["input: the file is empty", "wait until the run has written some"]),
     "binary": (bytes(range(256)) * 20, (), ["input: binary data", "csv", "glstat", "export"]),
     "prose": (b"Dear all,\nplease find enclosed\n", (), ["input:1: 'Dear all,'", "a table of time and energy"]),
     "header only": (HEAD.encode(), (), ["input:1: ", "no rows"]),
@@ -67,7 +67,7 @@ FILES = {
         ["no column 'internal_enrg'", "did you mean 'internal_energy'"]
     ),
     "column zero": (tabulate(math.cos), ("--energy", "0"), ["no column '0'", "1 'time'"]),
-    "energy is the time": (tabulate(math.cos), ("--energy", "time"), ["input: ", "choose another one as energy"]),
+    "energy is the time": (tabulate(math.cos), ("--energy", "time"), ["input: ", "choose another one"]),
     "td after the record": (tabulate(math.cos), ("--td", "7"), ["input: ", "--td 7 lies outside the record, 0 to 1"]),
     "after outside": (tabulate(math.cos), ("--after", "7"), ["input: --after 7 lies outside the record, 0 to 1"]),
     "window outside": (tabulate(math.cos), ("--fit-window", "0", "7"), ["--fit-window 0 7 reaches outside the record"]),

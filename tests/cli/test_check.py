@@ -904,4 +904,4 @@ def test_the_step_after_a_check_explains_an_error_above_all_warnings() -> None:
     place("late.k", LATE.replace(THERE, "*DATABASE_GLSTAT\n      0.01\n" + THERE))
     result = run("check", "late.k")
     assert result.stdout.index("warning D2R") < result.stdout.index("error D2R101")
-    assert "d2rpick rule D2R101 explains the worst of them" in result.stdout
+    assert "d2rpick rule D2R101 explains the most severe one" in result.stdout

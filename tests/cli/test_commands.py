@@ -83,9 +83,7 @@ def test_what_a_pair_keeps_and_how_good_it_is_are_two_things() -> None:
     assert text.startswith(
         "do not use tr = 0.0128853, td = 0.064 why the vibration after td is wrong by 96%, since 92% of"
     )
-    assert (
-        "to improve use tr = 0.0135867, td = 0.0687534: vibration wrong by 0.0%" in text
-    )
+    assert "to improve use tr = 0.0135867, td = 0.0687534: vibration error 0.0%" in text
     assert "motion good vibration poor" in text
     assert run(*pair, "--min-quality", "poor", ENERGY).exit_code == 0
     alone = run(*pair, "--no-verify", ENERGY)

@@ -75,6 +75,13 @@ def test_the_recommended_pair_is_that_of_suggest() -> None:
     assert {"tr": marked["tr"], "td": marked["td"]} == exploration["recommended"]
 
 
+def test_a_much_longer_rigid_time_is_given_as_a_factor() -> None:
+    exploration = run_json(
+        "explore", "--td", "0.11", str(ROOT / "sample_data" / "rollover_box.matsum")
+    )
+    assert "makes the rigid time 10.5 times as long" in exploration["answer"]
+
+
 def test_the_sentence_says_what_a_step_changes() -> None:
     exploration = run_json("explore", "--td", "0.064", *WINDOW, ENERGY)
     assert exploration["answer"] == (
@@ -169,7 +176,7 @@ def test_every_form_has_the_same_offers(tmp_path: Path) -> None:
         offer_row["unbeaten"] for offer_row in exploration
     ]
     table = run("explore", *WINDOW, "--limit", "3", ENERGY).stdout
-    assert f"... and {len(exploration) - 3} more td" in table
+    assert f"... and {len(exploration) - 3} more values of td" in table
     answer, *_, markdown_table = run(
         "explore", *WINDOW, "-f", "markdown", ENERGY
     ).stdout.split("\n\n")
@@ -234,9 +241,7 @@ def test_what_would_be_better_is_the_pair_that_suggest_names() -> None:
         [line.removeprefix("to improve").strip() for line in lines if "improve" in line]
         for lines in answers
     ]
-    assert (
-        cures == [["use tr = 0.0135867, td = 0.0687534: vibration wrong by 0.0%"]] * 2
-    )
+    assert cures == [["use tr = 0.0135867, td = 0.0687534: vibration error 0.0%"]] * 2
 
 
 @pytest.fixture(scope="module")

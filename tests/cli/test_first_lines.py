@@ -60,7 +60,7 @@ def test_parts_without_a_deck_are_unknown_and_the_deck_is_the_cure() -> None:
 def test_a_run_without_an_energy_balance_has_an_unknown_health() -> None:
     text = join_lines(run("info", MATSUM).stdout)
     assert text.startswith(
-        "record can be used to choose times: it has flights, and d2rpick plan judges their windows "
+        "record suitable for choosing times: it contains flights (d2rpick plan judges the windows in them) "
         "why 1 free flight"
     )
     assert "the health of the run is unknown" in text
@@ -121,11 +121,17 @@ def test_limits_that_are_kept_do_not_praise_a_pair_that_is_not_to_be_used() -> N
     result = run(*SWITCHED[:2], "--max-residual", "0.01", *SWITCHED[2:])
     assert result.exit_code == 1
     text = join_lines(result.stdout)
-    assert text.startswith("do not use tr = ")
     assert "passed" not in text
-    decided, compared = text.split(" comparison ")
+    compared, decided = text.split(" do not use tr = ")
     assert "why residual 0.0386 above the limit 0.01" in decided
-    assert compared.startswith("within limits: mean energy after td 108% of the")
+    assert "next use at most the motion of this switched run, up to the next" in decided
+    assert compared.startswith(
+        "comparison within limits, although the pair was poor: mean energy after td 108% of the"
+    )
+    assert (
+        "exit code 1: the comparison is within its limits, but the verdict is 'do not use'"
+        in result.stderr
+    )
     assert (
         "this does not show that the vibration is kept: standard deviation of the energy after td 2.12, in the "
         "reference run 2.08" in compared
@@ -200,7 +206,7 @@ def test_a_window_of_a_cut_file_is_that_of_the_part_that_was_read(
 ) -> None:
     cut = cut_file(tmp_path, SAMPLES / "energy.glstat", 100_000)
     plan = join_lines(run("plan", cut).stdout)
-    assert plan.startswith("use: make rigid from ")
+    assert plan.startswith("use: make the parts rigid from ")
     share, rest = plan.split("of the record that was read", 1)
     assert share.endswith("92% ")
     assert "note the record ends early, at 0.0316, within a state: " in rest

@@ -57,6 +57,24 @@ def test_a_run_that_flies_exits_with_0(tmp_path: Path) -> None:
     assert run("follow", "--once", str(tmp_path)).exit_code == 0
 
 
+def test_a_loop_that_waits_for_a_flight_ends_with_the_run(tmp_path: Path) -> None:
+    """A run without a listing may continue, so the loop looks again; its listing or a packed history ends it."""
+    data = gzip.decompress((ROOT / "tests/data/car_all_T01.gz").read_bytes())
+    (tmp_path / "carT01").write_bytes(data)
+    assert run("follow", "--once", str(tmp_path)).exit_code == 1
+    (tmp_path / "car_0001.out").write_text("NORMAL TERMINATION\n")
+    over = run("follow", "--once", str(tmp_path))
+    assert over.exit_code == 2
+    assert "exit code 2: the run has ended, and the parts do not fly" in over.stderr
+    assert run("follow", "--for", "0", str(tmp_path)).exit_code == 2
+    assert run("follow", "--once", "--exit-zero", str(tmp_path)).exit_code == 0
+    (tmp_path / "car_0001.out").write_text("ERROR TERMINATION\n")
+    assert run("follow", "--once", str(tmp_path)).exit_code == 2
+    assert run("follow", str(tmp_path)).exit_code == 1
+    assert run("follow", "--once", str(tmp_path / "absent*")).exit_code == 2
+    assert run("follow", "--once", str(tmp_path / "carT*")).exit_code == 2
+
+
 def test_an_interrupt_ends_it_with_a_line(tmp_path: Path) -> None:
     data = gzip.decompress((ROOT / "tests/data/drop2_w123_T01.gz").read_bytes())
     (tmp_path / "carT01").write_bytes(data)

@@ -115,5 +115,12 @@ def test_no_help_shows_an_expression_of_python() -> None:
         assert re.search(r"\{(?!(?:deck|threads)\})", text) is None, name
     helps = dict(list_options())
     assert (
-        "reference_m, published_m, better_m, or z_m, y_m" in helps["reproduce --solver"]
+        "either reference_m, published_m and better_m, or z_m"
+        in helps["reproduce --solver"]
     )
+
+
+def test_part_names_the_recommended_set_where_it_is_accepted() -> None:
+    naming = {name for name, help_ in list_options() if '"recommended"' in help_}
+    commands = ("suggest", "verify", "explore", "plan", "card")
+    assert naming == {f"{command} --part" for command in commands}

@@ -25,7 +25,7 @@ TABLES: Final = {
 COMMANDS: Final = {
     "no such file": ("info", "absent.csv"),
     "no glstat, matsum, binout, d3plot or T01 in this folder": ("plan", "empty"),
-    "this is a deck, an energy history was expected": ("plan", BOX_DECK),
+    "this is a deck, but an energy history was expected": ("plan", BOX_DECK),
     "binary data of no known format": ("plan", "random"),
     "this is a zip archive": ("plan", "archive.zip"),
     "do all files belong to the same run?": ("plan", MATSUM, GLSTAT),
@@ -55,7 +55,7 @@ COMMANDS: Final = {
     "no column ...; there are:": ("suggest", "--energy", "absent", ENERGY),
     "needs --deck": ("plan", "--part", "recommended", MATSUM),
     "No such option": ("suggest", "--tolerence", "0.1", ENERGY),
-    "a card for LS-DYNA needs --part": ("card", "--tr", "0.1", "--td", "0.3"),
+    "missing: --part IDS": ("card", "--tr", "0.1", "--td", "0.3"),
 }  # fmt: skip
 
 

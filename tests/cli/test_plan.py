@@ -139,7 +139,7 @@ def test_the_first_sentence_recommends_no_poor_window(history: list[str]) -> Non
     sentence = run(*arguments).stdout
     number = planned[1]["flight"]
     assert sentence.startswith(
-        f"use 1 of {len(rows)} windows now (do not use flight {number}): make rigid from"
+        f"use 1 of {len(rows)} windows now (do not use flight {number}): make the parts rigid from"
     )
 
 

@@ -21,6 +21,7 @@ from tests.command import (
     BOX,
     ENERGY,
     GLSTAT,
+    MATSUM,
     ROOT,
     put,
     read_refusal,
@@ -432,11 +433,13 @@ def test_a_figure_of_runs_that_were_kept_without_outline_reads_them_again(
     assert Path(figure).read_bytes() == first
 
 
-@pytest.mark.parametrize("option", ["-o", "--plot", "--report"])
+@pytest.mark.parametrize(
+    ("option", "suffix"), [("-o", "svg"), ("--plot", "svg"), ("--report", "html")]
+)
 def test_a_ledger_is_never_replaced_by_a_result(
-    runs: list[str], tmp_path: Path, option: str
+    runs: list[str], tmp_path: Path, option: str, suffix: str
 ) -> None:
-    name = str(tmp_path / "file.svg")
+    name = str(tmp_path / f"file.{suffix}")
     assert "are the same file" in read_refusal(
         *STUDY, *runs, "--resume", name, option, name, "--overwrite"
     )
@@ -459,17 +462,18 @@ def test_a_ledger_is_not_the_standard_output(runs: list[str], tmp_path: Path) ->
 # Files.
 
 
-@pytest.mark.parametrize("option", ["-o", "--plot", "--report"])
+@pytest.mark.parametrize(
+    ("option", "suffix"), [("-o", "svg"), ("--plot", "svg"), ("--report", "html")]
+)
 def test_a_file_in_the_folder_of_a_run_is_never_written_to(
-    tmp_path: Path, option: str
+    tmp_path: Path, option: str, suffix: str
 ) -> None:
     # A database is recognised by its content; its name would not fit a plot.
-    (tmp_path / "binout0.svg").symlink_to(tmp_path / "glstat")
+    file = tmp_path / f"binout0.{suffix}"
+    file.symlink_to(tmp_path / "glstat")
     (tmp_path / "glstat").write_bytes(Path(GLSTAT).read_bytes())
     content_before = (tmp_path / "glstat").read_bytes()
-    result = run(
-        *STUDY, str(tmp_path), option, str(tmp_path / "binout0.svg"), "--overwrite"
-    )
+    result = run(*STUDY, str(tmp_path), option, str(file), "--overwrite")
     assert (result.exit_code, "this is an input" in result.stderr) == (2, True)
     assert (tmp_path / "glstat").read_bytes() == content_before
 
@@ -546,3 +550,41 @@ def test_a_study_of_one_run_gives_the_verdict_of_suggest() -> None:
     assert suggestion["candidates"][0]["residual"] > 0.5
     assert study["common_verdict"] == suggestion["verdict"] == "use with care"
     assert study["runs"][0]["verdict"] == suggestion["verdict"]
+
+
+def test_a_study_says_which_energy_it_judged_and_how_to_choose_parts(
+    tmp_path: Path,
+) -> None:
+    """The files show which parts fly, but the energy of the whole model was judged."""
+    page = tmp_path / "page.html"
+    result = run("study", MATSUM, "--report", str(page))
+    assert re.search(
+        r"(?m)^judged +internal energy.*, not that of chosen parts \(--part\)$",
+        result.stdout,
+    )
+    step = "choose the parts to switch, for example those that fly, with d2rpick study --part flying"
+    assert step in " ".join(result.stdout.split())
+    assert "not that of chosen parts (--part)" in page.read_text()
+    (row,) = run_json_checked("study", MATSUM)["runs"]
+    assert row["is_unchosen"] is True
+    assert row["parts"] is None
+
+
+def test_a_study_of_chosen_parts_names_their_energy() -> None:
+    result = run("study", "--part", "1,2", MATSUM)
+    assert re.search(r"(?m)^judged +internal energy of box, step$", result.stdout)
+    assert "choose the parts" not in result.stdout
+    (row,) = run_json("study", "--part", "1,2", MATSUM)["runs"]
+    assert row["energy"] == "internal energy of box, step"
+    assert (row["parts"], row["is_unchosen"]) == ([1, 2], False)
+
+
+def test_a_study_of_a_table_without_parts_names_its_column() -> None:
+    result = run("study", "--td", "0.0687534", ENERGY)
+    assert re.search(r"(?m)^judged +internal_energy$", result.stdout)
+
+
+def test_the_recommended_set_is_refused_before_any_run_is_read() -> None:
+    refusal = read_refusal("study", "--part", "recommended", "absent.csv")
+    assert "--part recommended needs a deck" in refusal
+    assert "d2rpick parts" in refusal

@@ -161,7 +161,7 @@ def test_a_glob_takes_what_has_such_a_name() -> None:
     [
         (
             ("run/aT01", "run/bT01", "run/bT02"),
-            r"run: this folder holds several runs \(aT01, bT01\)",
+            r"run: this folder contains several runs \(aT01, bT01\)",
         ),
         (("run/aT01", "run/binout"), r"several runs \(aT01, one of LS-DYNA\)"),
         (("run/job7.glstat", "run/job8.matsum"), r"several runs \(job7, job8\)"),

@@ -189,7 +189,7 @@ def test_many_decks_begin_with_the_decision_and_end_with_those_without_findings(
     results = [check_deck(str(deck)) for deck in decks]
     lines = write_findings("table", results, tmp_path).split("\n")
     assert lines[0] == "errors  in 1 of 3 decks"
-    assert lines[2].startswith("next    correct what the lines above report")
+    assert lines[2].startswith("next    correct the findings above")
     assert lines[4] == "c.k"
     assert lines[-3] == "no findings in 2 decks without rigid windows: a.k, b.k"
     passed = write_findings("table", results[:2], tmp_path).split("\n")

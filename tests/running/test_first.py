@@ -94,7 +94,7 @@ def test_parts_at_rest_that_fall_are_rigid_from_the_start(tmp_path: Path) -> Non
         parts=(1, 2),
     )
     assert [rigid for rigid, _ in read_leg_states(prepared.files)] == 4 * [True, False]
-    assert "in free fall from rest: rigid from 0" in prepared.notes[0]
+    assert "fall freely from rest, so they are rigid from 0" in prepared.notes[0]
     later = d2.first(
         write_radioss_run(tmp_path / "ref", CONTACT + GRAVITY),
         tmp_path / "later",
@@ -130,7 +130,7 @@ def test_the_check_says_that_it_does_not_know_these_times(tmp_path: Path) -> Non
         (
             CONTACT,
             {"parts": None},
-            r"deactivates no rigid body \(/RBODY/OFF\); name those to be switched with `parts`",
+            r"missing: `parts` \(parts to switch; .* deactivates no rigid body \(/RBODY/OFF\)",
         ),
     ],
 )
@@ -152,7 +152,7 @@ def test_a_deck_without_known_springs_asks_for_the_wait(tmp_path: Path) -> None:
     Path(main).write_text(
         Path(main).read_text().replace("/PROP/SPRING/", "/PROP/SPR_GENE/")
     )
-    with pytest.raises(ValueError, match=r"`wait` cannot be derived from"):
+    with pytest.raises(ValueError, match=r"missing: `wait` \(force-free time"):
         d2.first(main, tmp_path / "next", parts=(1, 2))
     assert (
         d2.first(main, tmp_path / "next", parts=(1, 2), wait=0.01).reason == "as given"
@@ -295,7 +295,7 @@ def test_what_falls_from_rest_is_rigid_from_the_start_in_ls_dyna_too(
     deck.write_text(deck.read_text().replace("*END", f"{FALLS}{velocity}*END"))
     notes = d2.first(deck, tmp_path / "next", parts="1-3", wait=0.02).notes
     assert any("if you know the end of the load" in note for note in notes) is thrown
-    assert any("In free fall from rest" in note for note in notes) is not thrown
+    assert any("fall freely from rest" in note for note in notes) is not thrown
 
 
 def test_a_file_that_is_replaced_keeps_its_mode(tmp_path: Path) -> None:

@@ -241,13 +241,13 @@ def compare_error_with_contact(
 
 @remember
 def find_energy_of_next_contact(history: History, flight: Flight) -> float | None:
-    """Return the energy that the next contact puts into the parts [energy]; None if the record shows no contact.
+    """Return the energy that the next contact puts into the parts [energy]; None if the record does not show it.
 
     This energy is the rise of the internal energy after the flight that the record shows, or else the kinetic energy of
     the approach at the end of the flight.
     """
     end = flight.end
-    if end is None:
+    if end is None or not flight.shows_contact:
         return None
     _, energies = history.between(end, np.inf)
     rise = float(energies.max(initial=-np.inf)) - history.energy_at(end)

@@ -43,6 +43,10 @@ CHECK_SWITCHED_RUN: Final = (
     "check that the switched run was switched at these times and is otherwise identical to the reference run; "
     "if so, choose another td"
 )
+# GIVE_SWITCHED_RUN_OF_MODEL: advice if the switched run differs from the reference run before the switch.
+GIVE_SWITCHED_RUN_OF_MODEL: Final = (
+    "give the switched run of this model, with the same loads and velocities"
+)
 # _USE_BEST: advice if the best pair in the given range of td can be used with care.
 # _AVOID_BEST: advice if even the best pair in the given range of td cannot be used.
 _USE_BEST: Final = (
@@ -93,6 +97,8 @@ class Decision(NamedTuple):
         True if the record ends before the next contact.
     is_compared : bool
         True if a finished switched run was compared with the reference run.
+    other_pairs : tuple of (str, Pair)
+        Further pairs that are better, each with the words that introduce it.
     """
 
     grade: str
@@ -108,6 +114,7 @@ class Decision(NamedTuple):
     best_of: tuple[float, float] | None = None
     ends_in_flight: bool = False
     is_compared: bool = False
+    other_pairs: tuple[tuple[str, Pair], ...] = ()
 
     @property
     def verdict(self) -> str:
@@ -200,7 +207,7 @@ class Decision(NamedTuple):
             )
         if self.residual is not None:
             parts.append(
-                f"vibration wrong by {format_residual(self.residual)} (residual {self.residual:.3f})"
+                f"vibration error {format_residual(self.residual)} (residual {self.residual:.3f})"
             )
         return ", ".join(parts) or "unknown: no model of the vibration fits the record"
 
@@ -212,18 +219,20 @@ class Decision(NamedTuple):
         low, high = self.mean_energy_bounds
         if limits.low <= low and high <= limits.high:
             return ""
-        accepted = f"d2rpick verify accepts {format_bounds(limits)} of a switched run"
+        accepted = f"d2rpick verify accepts a switched run with {format_bounds(limits)}"
         if high < limits.low:
             # The limit is rounded down to a whole per cent, so that it accepts the lower bound.
             lowest = floor(100 * low) / 100
             return (
-                f" ({accepted}, so it will refuse that run by its mean energy; to accept it because only the motion "
-                f"is used, set `min_mean_energy` to {lowest:g})"
+                f" ({accepted}, so it will reject the run because of its mean energy; to accept it because only the "
+                f"motion is used, set `min_mean_energy` to {lowest:g})"
             )
         if low > limits.high:
-            return f" ({accepted}, so it will refuse that run by its mean energy)"
+            return (
+                f" ({accepted}, so it will reject the run because of its mean energy)"
+            )
         return (
-            f" ({accepted}, so only the comparison shows whether it accepts that run)"
+            f" ({accepted}; only the comparison shows whether the run will be accepted)"
         )
 
     @property
@@ -232,11 +241,11 @@ class Decision(NamedTuple):
         if self.at_rest:
             return "the same"
         if self.residual is None:
-            text = f"vibration wrong by {format_residual(self.worst_residual)}"
+            text = f"vibration error {format_residual(self.worst_residual)}"
             return f"{text}, if the deformation at tr is opposite to that at td"
         if self.worst_residual - self.residual <= _ALIKE:
             return "the same"
-        return f"vibration wrong by {format_residual(self.worst_residual)}"
+        return f"vibration error {format_residual(self.worst_residual)}"
 
     @property
     def cure(self) -> str:
@@ -247,7 +256,15 @@ class Decision(NamedTuple):
             # A better pair of the same record cannot be used either.
             return self.cure_without_other_times
         if self.better is not None:
-            return f"use {_describe_pair(self.better, self.better_level)}"
+            best = f"use {_describe_pair(self.better, self.better_level)}"
+            if not self.other_pairs:
+                return best
+            others = [
+                f"{introduction}, {_describe_pair(pair, None)}, rigid for {pair.td - pair.tr:.6g}"
+                for introduction, pair in self.other_pairs
+            ]
+            rigid_time = self.better.td - self.better.tr
+            return "; ".join([f"{best}, rigid for {rigid_time:.6g}", *others])
         if self.is_outside_flight and not self.is_compared:
             return CHOOSE_TIMES_IN_FLIGHT
         if self.objections or not self.quality.causes:
@@ -345,7 +362,7 @@ def _explain_why_good(quality: Quality, residual: float | None) -> str:
         error = (
             "" if residual is None else f" with an error of {format_residual(residual)}"
         )
-        return f"the flight is certain, and the vibration after td is kept{error}"
+        return f"the flight is certain, and the vibration after td is reproduced{error}"
     return f"{'; '.join(quality.alone.reasons)}{_explain_raised_grade(quality)}"
 
 
@@ -383,4 +400,4 @@ def _describe_pair(pair: Pair, level: float | None) -> str:
         return f"{times}: the energy at td is {level:.3g} times as high, so more of the vibration can be kept"
     if pair.residual is None:
         return times
-    return f"{times}: vibration wrong by {format_residual(pair.residual)}"
+    return f"{times}: vibration error {format_residual(pair.residual)}"

@@ -15,6 +15,7 @@ from d2rpick.choice.pair.aftermath import (
     compute_static_change,
 )
 from d2rpick.choice.pair.candidates import Candidates, judge_candidates
+from d2rpick.choice.pair.few_states import ENOUGH_STATES
 from d2rpick.choice.pair.grades import (
     FAIR,
     GOOD,
@@ -29,6 +30,7 @@ from d2rpick.choice.pair.warnings import (
     POOR_RESIDUAL,
     list_times_outside_flight,
 )
+from d2rpick.histories.samples import changes_at_random
 from d2rpick.histories.surroundings import UNKNOWN
 from d2rpick.vibration.identify import MIN_PLASTIC, MIN_SAMPLES_PER_PERIOD
 from d2rpick.vibration.measures import TOLERATED_GROWTH
@@ -68,8 +70,6 @@ _BAND: Final = 0.25
 # MOST_WORTH_OF_FAIR: largest vibration-error energy of a fair pair, relative to the energy of the next contact [-].
 MOST_WORTH_OF_GOOD: Final = 0.01
 MOST_WORTH_OF_FAIR: Final = 0.05
-# Smallest number of states that resolve a flight; if there are fewer, a shorter output interval is proposed.
-ENOUGH_STATES: Final = 200
 # More frequent output is proposed as a cure only if fewer than this number of states lie before td.
 _FEW_STATES: Final = 20
 # Largest number of parts that are named in a sentence.
@@ -273,7 +273,8 @@ class Cause(NamedTuple):
     each pair of the record, so that other times do not help unless the record or the deck is improved, or other parts
     are chosen. ``kind`` is the reason without the numbers of this pair, by default the reason itself; tables state it
     once for several pairs. ``better_parts`` contains values of `parts` for which the cause does not apply.
-    ``needs_deck`` is True if the deck of the run may remove the cause.
+    ``needs_deck`` is True if the deck of the run may remove the cause. ``is_unknown_load`` is True if an unknown load
+    may change the motion.
     """
 
     reason: str
@@ -283,6 +284,7 @@ class Cause(NamedTuple):
     is_of_record: bool = False
     better_parts: tuple[str, ...] = ()
     needs_deck: bool = False
+    is_unknown_load: bool = False
 
     @property
     def general_reason(self) -> str:
@@ -298,6 +300,11 @@ _NEGATIVE_ENERGY: Final = Cause(
     "the energy becomes negative, which an internal energy never does",
     "name the internal energy with `energy` or `parts`",
 )
+_NOISE: Final = Cause(
+    "noise hides the vibration: most changes of the energy from state to state are random",
+    "name an energy with less noise, such as that of the parts, or a file with more digits (binout)",
+    is_of_record=True,
+)
 _UNKNOWN_OUTSIDE: Final = Cause(
     "the error of the vibration is unknown, because tr or td lies outside the flight",
     CHOOSE_TIMES_IN_FLIGHT,
@@ -308,12 +315,14 @@ _UNKNOWN_MASS: Final = Cause(
     "write the mass, or the kinetic and internal energy, or give the file with the energies of the parts (LS-DYNA "
     "matsum, Radioss T01)",
     is_of_record=True,
+    is_unknown_load=True,
 )
 _UNKNOWN_LOAD: Final = Cause(
     "gravity or another load changes momentum or energy in the flight",
     "give the deck of the run as `deck`, because it defines gravity and loads, or write the part momenta",
     is_of_record=True,
     needs_deck=True,
+    is_unknown_load=True,
 )
 # The cause if the user gave the deck, but its loads do not explain the change of momentum or energy.
 _UNKNOWN_LOAD_WITH_DECK: Final = _UNKNOWN_LOAD._replace(
@@ -489,6 +498,25 @@ def refuse_error(quality: Quality, errors: Sequence[str]) -> Quality:
     return quality._replace(vibration=refused, alone=refused)
 
 
+def trust_measured_momentum(quality: Quality) -> Quality:
+    """Return the grades of a pair whose computed switched run has the momentum of the reference run after td.
+
+    A load that the record does not explain acts in both runs, so it makes the motion no worse than "fair".
+    """
+    motion = quality.motion
+    if not motion.causes or not all(cause.is_unknown_load for cause in motion.causes):
+        return quality
+    causes = tuple(
+        cause._replace(
+            reason=f"{cause.reason}, but the momentum of the computed run agrees",
+            is_of_record=False,
+            needs_deck=False,
+        )
+        for cause in motion.causes
+    )
+    return quality._replace(motion=Grade(FAIR, causes))
+
+
 def _list_causes_for_poor(
     situation: Situation, best: Candidate, best_residual: float | None
 ) -> list[Cause]:
@@ -506,7 +534,7 @@ def _list_causes_for_poor(
     if _is_energy_negative(*record):
         causes.append(_NEGATIVE_ENERGY)
     if situation.basis == "energy":
-        causes += _list_causes_of_record(*record)
+        causes += list_causes_of_record(*record)
     causes += _list_causes_of_static_change(situation, best)
     return causes
 
@@ -629,22 +657,26 @@ def _describe_wrong_vibration(situation: Situation, residual: float) -> Cause:
             kind=f"{_WRONG_BY_MORE} {POOR_RESIDUAL:.0%}",
         )
     return Cause(
-        f"{reason}, since {share:.0%} of its energy is kinetic at td, which no tr can keep",
+        f"{reason}, since {share:.0%} of its energy is kinetic at td, and no tr can keep kinetic energy",
         "use d2rpick explore to see whether another td is better",
         needs_other_times=True,
-        kind="most of the vibration energy is kinetic at td, which no tr can keep",
+        kind="most of the vibration energy is kinetic at td, and no tr can keep kinetic energy",
     )
 
 
 @remember
-def _list_causes_of_record(
+def list_causes_of_record(
     history: History, start: float | None, td: float
 ) -> tuple[Cause, ...]:
     """Return the reasons why the states of the flight up to td do not suffice to determine the energy level."""
     _, energy = history.between(-np.inf if start is None else start, td)
     causes = []
     states = count_states_per_period(energy)
-    if states is not None and states < MIN_SAMPLES_PER_PERIOD:
+    if states is None or states >= MIN_SAMPLES_PER_PERIOD:
+        return ()
+    if changes_at_random(energy):
+        causes.append(_NOISE)
+    else:
         states_text = f"the energy has {states:.3g} states per period"
         causes.append(
             Cause(

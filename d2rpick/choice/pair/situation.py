@@ -13,6 +13,7 @@ from d2rpick.base.errors import RangeError
 from d2rpick.base.memory import remember
 from d2rpick.choice.pair.together import PartsTogether
 from d2rpick.choice.parts.margins import find_drift_of_bodies, find_margin
+from d2rpick.choice.question import FEWEST_STATES
 from d2rpick.flight.chosen import Described, choose_flight
 from d2rpick.flight.flight import Flight, Seen, find_seen_flight
 from d2rpick.flight.internal_energy import find_largest, find_quiet_time, round_off
@@ -53,8 +54,6 @@ if TYPE_CHECKING:
     Look = Callable[[float], "Situation"]
 
 
-# Smallest number of states from which times can be chosen.
-FEWEST_STATES: Final = 3
 # Assumed upper bound of the error in energies from the solver, as a fraction of the highest energy [-].
 _SOLVER_ERROR: Final = 1e-5
 # Energy fluctuations up to this fraction of the largest vibration energy after the load are ignored [-].
@@ -388,7 +387,7 @@ def _check_times(history: History, td: float, settings: Settings) -> None:
             count = f"{history.time.size} states were"
         raise RangeError(
             f"{', '.join(history.source)}: {count} found, "
-            f"at least {FEWEST_STATES} were expected; "
+            f"but at least {FEWEST_STATES} were expected; "
             "write the energies more often, or wait until the run has written them"
         )
     history.energy_at(td, "td")

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 # Parts that the energy of a table must contain, because the verdict on a pair assumes it.
 ASSUMED_PARTS: Final = (
-    "that of the switched parts, and of all parts that vibrate with them"
+    "the energy of the switched parts and of all parts that vibrate with them"
 )
 
 

@@ -6,7 +6,7 @@ Each warning has a stable code for scripts and a sentence for users.
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -36,6 +36,8 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
     from d2rpick.vibration.measures import Columns
 
+# Code of the warning about a given landing at which the record shows no contact.
+LANDING_NOT_SHOWN: Final = "landing-not-shown"
 # Modes of higher frequency are detected only if each energy period has at least this number of states.
 _FEW_STATES = 4
 # Kinetic fraction at td above which every tr loses more than half of the vibration energy [-].
@@ -165,6 +167,7 @@ def _warn_about_flight(situation: Situation) -> Iterator[Caution]:
             "td-in-load",
             f"td = {td:.6g} lies {'at' if td == earliest else 'before'} {describe_end_of_load(situation)}",
         )
+    yield from _warn_about_given_landing(situation)
     yield from _warn_about_grazing(situation)
     yield from _warn_about_unknown_rotation(situation)
     if td > situation.latest_td and not flight.refusal:
@@ -172,6 +175,18 @@ def _warn_about_flight(situation: Situation) -> Iterator[Caution]:
             "td-after-contact",
             f"td = {td:.6g} lies after {describe_end_of_flight(situation)}",
         )
+
+
+def _warn_about_given_landing(situation: Situation) -> Iterator[Caution]:
+    """Yield a warning if the user gave a landing at which the record shows no contact."""
+    flight = situation.flight
+    if flight.end is None or flight.refusal or flight.shows_contact:
+        return
+    shown = (
+        f"the record shows no contact at `landing` {flight.end:.6g}: the parts fly on"
+    )
+    graded = "the energy of what happens there is unknown, so the vibration is graded by its error alone"
+    yield Caution(LANDING_NOT_SHOWN, f"{shown}; {graded}")
 
 
 def _warn_about_grazing(situation: Situation) -> Iterator[Caution]:
@@ -303,7 +318,13 @@ def describe_end_of_load(situation: Situation) -> str:
 
 def describe_end_of_flight(situation: Situation) -> str:
     """Describe ``latest_td`` in words: the end of the flight, minus the margin if there is one."""
-    return f"the end of the flight at {situation.flight.end:.6g}{_describe_margin(situation.margin)}"
+    end = situation.flight.end
+    cause = ""
+    if any(start == end for start, _ in situation.history.holes):
+        cause = ", where the states stop (is a restart segment missing?)"
+    return (
+        f"the end of the flight at {end:.6g}{cause}{_describe_margin(situation.margin)}"
+    )
 
 
 def _describe_margin(margin: float | None) -> str:
@@ -674,6 +695,11 @@ def _describe_in_load(situation: Situation) -> str:
     """State that a tr lies before the flight, or that no flight is known."""
     if situation.earliest_tr is None:
         return situation.flight.refusal or "unknown: no end of the load is found"
+    start = situation.flight.start
+    if any(end == start for _, end in situation.history.holes):
+        return (
+            f"tr before the states go on at {start:.6g} (is a restart segment missing?)"
+        )
     return f"tr before {describe_end_of_load(situation)}"
 
 
@@ -691,7 +717,7 @@ def _describe_above_reference(means: Means | None, energy: float) -> Iterator[st
     if means:
         times = format_beyond_limit(means.ratio(energy), MOST_KEPT)
         text = f"the mean energy after td is expected to be {times} times that of the reference run"
-        yield f"{text}, at most {MOST_KEPT:g} was expected"
+        yield f"{text}, but at most {MOST_KEPT:g} was expected"
 
 
 def list_objections_to_td(situation: Situation) -> Iterator[str]:

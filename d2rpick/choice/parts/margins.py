@@ -65,7 +65,7 @@ def find_margin(history: History, flight: Flight, settings: Settings) -> Margin:
     turning = compute_turning_speed(history, flight, bodies, settings.placement)
     margin = compute_margin(history, flight, place=position_error, turning=turning)
     is_known = direction is None or bodies.compute_speed_at_front(direction) is not None
-    if is_known or margin.source == "no-contact":
+    if is_known or margin.source == "no-contact" or not flight.shows_contact:
         return margin
     return margin._replace(
         rotation=_judge_rotation(history, flight, margin, position_error)

@@ -21,6 +21,7 @@ from d2rpick.base.errors import (
     RangeError,
     format_in_one_line,
     list_names,
+    name_units,
 )
 from d2rpick.choice.answers import decide_with_better_pair, suggest_in_run
 from d2rpick.choice.pair.grades import GRADES, POOR
@@ -46,7 +47,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.answers import PairSuggestion
     from d2rpick.choice.pair.decision import Decision
     from d2rpick.choice.question import Settings
-    from d2rpick.histories.history import Samples
+    from d2rpick.histories.history import History, Samples
 
 # Status of a run; only runs with one of the first two values were judged.
 OK, NONE, UNREADABLE, OUT_OF_RANGE, FAILED = (
@@ -66,6 +67,8 @@ _ROUNDED: Final = 0.001
 _NOT_REPEATED = ("no-candidate",)
 # A record is complete if it ends no earlier than this fraction of the median end time of all runs [-].
 _WHOLE: Final = 0.99
+# Largest difference of two times that are taken as equal but for their unit, relative to the times [-].
+_SAME_TIME: Final = 0.02
 # Number of intervals into which a curve is divided; only the lowest and highest energy of each interval are drawn.
 _STRETCHES = 200
 
@@ -106,7 +109,10 @@ class StudyRow:
     of the suggestion for this run. ``td`` is that of this run, and ``better_td`` that of a better pair. ``acceptable``
     contains the windows of acceptable tr, shape (n, 2), and ``alike`` the windows in which the error exceeds that of
     the run's own tr by at most 0.05. ``profile`` contains the errors, shape (2, m). ``files`` were read up to
-    ``record_end`` [time]. ``curve`` is an outline of the energy, shape (2, k), if it was requested.
+    ``record_end`` [time]. ``curve`` is an outline of the energy, shape (2, k), if it was requested. ``energy`` is the
+    name of the energy by which the run was judged. ``parts`` contains the ids of the parts to which it belongs; None
+    for the whole model or a column. ``is_unchosen`` is True if it is the energy of the whole model because no part or
+    energy was chosen, although the files show which parts fly.
     """
 
     source: str
@@ -128,6 +134,9 @@ class StudyRow:
     verdict_reason: str | None = None
     cure: str | None = None
     better_td: float | None = None
+    energy: str | None = None
+    parts: tuple[int, ...] | None = None
+    is_unchosen: bool | None = None
     acceptable: Samples = field(default_factory=lambda: np.zeros((0, 2)))
     alike: Samples = field(default_factory=lambda: np.zeros((0, 2)))
     profile: Samples | None = None
@@ -247,7 +256,15 @@ def judge_run(question: Question, source: str) -> StudyRow:
     time = reference.history.time
     energy = reference.history.energy
     curve = draw_outline(time, energy, _STRETCHES) if question.curve else None
-    return replace(make_row(source, answer), files=files, curve=curve, record_end=end)
+    is_chosen = bool(question.selection.energy or question.selection.parts)
+    shows_parts = answer.situation.flight.by_parts
+    return replace(
+        make_row(source, answer),
+        files=files,
+        curve=curve,
+        record_end=end,
+        is_unchosen=shows_parts and not is_chosen,
+    )
 
 
 def make_row(source: str, answer: PairSuggestion) -> StudyRow:
@@ -273,6 +290,8 @@ def make_row(source: str, answer: PairSuggestion) -> StudyRow:
         warnings=tuple(code for code in messages if code not in _NOT_REPEATED),
         time_unit=situation.history.time_unit,
         energy_unit=situation.history.energy_unit,
+        energy=situation.history.energy_name,
+        parts=_list_part_ids(situation.history),
         td=situation.td,
         acceptable=acceptable,
         alike=alike,
@@ -289,6 +308,13 @@ def make_row(source: str, answer: PairSuggestion) -> StudyRow:
         residual=best.residual,
         **_list_decision_fields(_decide(answer)),
     )
+
+
+def _list_part_ids(history: History) -> tuple[int, ...] | None:
+    """Return the ids of the parts to which an energy belongs, without the springs; None for the whole model."""
+    if history.parts is None:
+        return None
+    return tuple(part.id for part in history.parts if part not in history.springs)
 
 
 def _decide(answer: PairSuggestion) -> Decision | None:
@@ -363,8 +389,43 @@ def find_cut_runs(rows: Sequence[StudyRow]) -> list[StudyRow]:
     return [
         row
         for row, end in read_to
-        if end < _WHOLE * whole or "truncated-input" in row.warnings
+        if (end < _WHOLE * whole and not _find_unit_ratio(end, whole))
+        or "truncated-input" in row.warnings
     ]
+
+
+def describe_other_unit(rows: Sequence[StudyRow]) -> str:
+    """Return that the times of some runs are 1000 or 1,000,000 times those of others; empty if none are."""
+    ended = [row for row in rows if row.record_end and row.tr]
+    for row in ended:
+        first = ended[0]
+        ratio = _find_unit_ratio(first.record_end or 0.0, row.record_end or 0.0)
+        if ratio and ratio == _find_unit_ratio(first.tr or 0.0, row.tr or 0.0):
+            return _compare_units(row, first, ratio)
+        ratio = _find_unit_ratio(row.record_end or 0.0, first.record_end or 0.0)
+        if ratio and ratio == _find_unit_ratio(row.tr or 0.0, first.tr or 0.0):
+            return _compare_units(first, row, ratio)
+    return ""
+
+
+def _compare_units(later: StudyRow, earlier: StudyRow, ratio: float) -> str:
+    """Return that the times of two runs seem to have different units."""
+    return (
+        f"the times of {later.source} are {ratio:g} times those of {earlier.source}, so they seem to be in another "
+        "unit; convert the runs to one unit of time"
+    )
+
+
+def _find_unit_ratio(time: float, later: float) -> float:
+    """Return 1000 or 1,000,000 if ``later`` is about this multiple of ``time``; 0 otherwise."""
+    return next(
+        (
+            size
+            for size in (1e3, 1e6)
+            if abs(later - size * time) <= _SAME_TIME * size * time
+        ),
+        0.0,
+    )
 
 
 def describe_end_of_record(row: StudyRow) -> str:
@@ -418,10 +479,17 @@ def _warn_about_runs(rows: Sequence[StudyRow], common: Common) -> Iterator[Cauti
         "the runs have different units of time, but td has only one",
         [row.time_unit for row in judged],
     )
+    if in_other_unit := describe_other_unit(judged):
+        yield Caution("mixed-units", in_other_unit)
     yield from _warn_about_difference(
         "mixed-bases",
         "the basis of the choice differs between the runs",
         [row.basis for row in judged],
+    )
+    yield from _warn_about_difference(
+        "mixed-parts",
+        "the runs were judged by the energies of different parts, so the common tr belongs to different switches",
+        [_name_parts(row) for row in judged],
     )
     for code in dict.fromkeys(code for row in judged for code in row.warnings):
         sources = [row.source for row in judged if code in row.warnings]
@@ -448,10 +516,12 @@ def _warn_about_unusual_files(rows: Sequence[StudyRow]) -> Iterator[Caution]:
         text = (
             f"{len(left_out)} of {format_number_of_runs(len(rows))} could not be judged"
         )
-        yield Caution(
-            "runs-left-out",
-            f"{text} and are left out: {list_names(left_out, most=NAMED)}",
-        )
+        first = next(row for row in rows if not row.judged)
+        if len(left_out) == 1:
+            which = f"is left out: {explain_left_out(first)}"
+        else:
+            which = f"are left out: {list_names(left_out, most=NAMED)}; the first: {explain_left_out(first)}"
+        yield Caution("runs-left-out", f"{text} and {which}")
     cut = [
         f"{row.source} ({describe_end_of_record(row)})" for row in find_cut_runs(rows)
     ]
@@ -461,6 +531,17 @@ def _warn_about_unusual_files(rows: Sequence[StudyRow]) -> Iterator[Caution]:
             "cut-runs",
             f"{count} were cut, or end earlier than most: {list_names(cut, most=NAMED)}",
         )
+
+
+def explain_left_out(row: StudyRow) -> str:
+    """Return why a run could not be judged, with the name of the run once."""
+    message = row.message or row.status
+    return message if row.source in message else f"{row.source}: {message}"
+
+
+def _name_parts(row: StudyRow) -> str:
+    """Return the parts by whose energy a run was judged, in words."""
+    return "the whole model" if row.parts is None else name_units(row.parts)
 
 
 def _warn_about_difference(
@@ -582,6 +663,8 @@ def _explain_why_apart(judged: Sequence[StudyRow], unsuited: str) -> str:
     without = [row.source for row in judged if not row.acceptable.size]
     if without:
         return f"no tr at all is admissible in {list_names(without, most=NAMED)}"
+    if in_other_unit := describe_other_unit(judged):
+        return in_other_unit
     apart = next(row for row in judged if row.source == unsuited)
     for row in judged:
         if not find_common_windows([apart.acceptable, row.acceptable]).size:

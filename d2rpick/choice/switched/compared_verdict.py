@@ -49,6 +49,10 @@ def add_comparison(
         sort_windows(windows, (tr, verdict.td)),
         min_mean,
     )
+    reasons = verdict.reasons + comparison.objections
+    if comparison.is_of_other_run:
+        # Nothing else in the comparison means anything.
+        reasons = comparison.objections + verdict.reasons
     interval = _find_output_interval(switched.history, tr) if tr_is_read else None
     return replace(
         verdict,
@@ -58,7 +62,7 @@ def add_comparison(
         tr_interval=interval,
         # If the switched run deviates too much, the pair is inadmissible, whatever the reference run shows.
         admissible=verdict.admissible and not comparison.objections,
-        reasons=verdict.reasons + comparison.objections,
+        reasons=reasons,
         cautions=(*verdict.cautions, *warn_about_engine(switched.run.sources)),
     )
 

@@ -5,6 +5,7 @@ Between tr and td, only the energy is compared, because no kinetic energy or mom
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
@@ -15,6 +16,7 @@ from d2rpick.choice.switched.same_model import (
     MOST_MOMENTUM_ERROR,
     check_before_window,
     check_same_model,
+    explain_difference,
 )
 from d2rpick.choice.switched.switch_times import SwitchedWindows
 from d2rpick.choice.switched.switched_run import choose_same_parts
@@ -23,7 +25,7 @@ from d2rpick.flight.window import LAST_DIGIT
 from d2rpick.vibration import measures
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from d2rpick.base.spans import Times
     from d2rpick.choice.pair.situation import Situation
@@ -52,9 +54,10 @@ _UNKNOWN_WINDOWS: Final = SwitchedWindows(None)
 class Comparison(NamedTuple):
     """Differences between a switched run and its reference run; unknown quantities are None.
 
-    The fields are the keys of the JSON output, except the last three: ``min_mean`` is the smallest expected ratio of
+    The fields are the keys of the JSON output, except the last four: ``min_mean`` is the smallest expected ratio of
     the means [-], ``has_energy`` is False if the energies after td are not compared, because they are only round-off or
-    all wrong, and ``misreported`` contains the names of the parts for which the solver reports a wrong energy after td.
+    all wrong, ``misreported`` contains the names of the parts for which the solver reports a wrong energy after td, and
+    ``is_of_other_run`` is True if the runs differ although neither was rigid yet.
 
     ``energy_frozen`` is the energy of the switched run at td, ``energy_td`` that of the reference run. ``rigid_from``
     and ``rigid_to`` are the first and last states of the window around the middle of (tr, td) in which the energy of
@@ -86,6 +89,7 @@ class Comparison(NamedTuple):
     min_mean: float = 0.0
     has_energy: bool = True
     misreported: tuple[str, ...] = ()
+    is_of_other_run: bool = False
 
 
 def compare_with_reference(
@@ -129,10 +133,14 @@ def compare_with_reference(
         is_reported=judged.is_reported,
         min_mean=min_mean,
         windows=windows,
+        explain=partial(explain_difference, run, switched.run),
     )
     others = (*windows.earlier, *windows.later)
+    objections = (*judged.objections, *comparison.objections)
+    if comparison.is_of_other_run:
+        objections = (*comparison.objections, *judged.objections)
     return comparison._replace(
-        objections=(*judged.objections, *comparison.objections),
+        objections=objections,
         notes=(*judged.notes, *comparison.notes),
         other_windows=tuple((window.tr, window.td) for window in others),
         misreported=judged.misreported,
@@ -157,6 +165,7 @@ def compare_runs(
     is_reported: bool = True,
     min_mean: float = 0.0,
     windows: SwitchedWindows = _UNKNOWN_WINDOWS,
+    explain: Callable[[], str] = str,
 ) -> Comparison:
     """Check whether a switched run was rigid from tr to td, and compare its energy after td with the reference run.
 
@@ -179,6 +188,8 @@ def compare_runs(
         ``min_mean``.
     windows : SwitchedWindows
         The rigid windows of the switched run, as far as they are known.
+    explain : callable
+        Returns what is known of the models of the two runs if their energies differ before the switch.
 
     Raises
     ------
@@ -194,8 +205,10 @@ def compare_runs(
     limit = _find_limit_of_change(reference, switched, tr, td)
     rigid = _find_rigid_window(switched, pair, limit, windows)
     first_rigid = min(rigid[0] if rigid else tr, tr)
+    first_of_all = min(first_rigid, windows.first_rigid)
+    of_other_run = [*check_same_model(reference, switched, first_of_all, explain)]
     objections = [
-        *check_same_model(reference, switched, min(first_rigid, windows.first_rigid)),
+        *of_other_run,
         *_check_rigid_window(reference, switched, rigid, tr, td, limit),
     ]
     differing = [
@@ -229,6 +242,7 @@ def compare_runs(
         notes=tuple(notes),
         min_mean=min_mean,
         has_energy=is_reported and mean_reference > rounding,
+        is_of_other_run=bool(of_other_run),
     )
 
 
@@ -455,7 +469,7 @@ def _check_mean_energy(share: float, min_mean: float) -> Iterator[str]:
         mean_text = (
             f"the mean energy after td is {share:.0%} of that of the reference run"
         )
-        yield f"{mean_text}, {100 * min_mean:g}% to {100 * (2 - min_mean):g}% were expected (`min_mean_energy`)"
+        yield f"{mean_text}, but {100 * min_mean:g}% to {100 * (2 - min_mean):g}% were expected (`min_mean_energy`)"
 
 
 def _check_momentum(error: float | None) -> Iterator[str]:

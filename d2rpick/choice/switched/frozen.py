@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from d2rpick.base.spans import Times
     from d2rpick.histories.history import History, Samples
 
+# Code of the warning about a record of a switched run.
+RIGID_TIMES: Final = "rigid-times"
 # A part is recognised as rigid after at least this number of states without kinetic energy or of constant energy.
 FEWEST: Final = 12
 # An energy vibrates if it changes by at least this multiple of the limit for a constant energy [-].

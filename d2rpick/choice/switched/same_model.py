@@ -12,13 +12,22 @@ from d2rpick.choice.switched.frozen import FEWEST
 from d2rpick.flight.internal_energy import round_off
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     from d2rpick.histories.history import History
+    from d2rpick.histories.names import Part
     from d2rpick.histories.run import OpenedRun
 
 # Runs belong to the same model if their energies before the switch differ by at most this fraction [-].
 _OF_ANOTHER_MODEL: Final = 0.2
+# The masses of a part in two runs of one model differ by at most this fraction [-], for example by mass scaling.
+_MOST_MASS_ERROR: Final = 0.2
+# DIFFERENT_MODELS: beginning of an objection if the files show that two runs belong to different models.
+# UNKNOWN_DIFFERENCE: beginning of an objection if two runs differ and the files do not show why.
+DIFFERENT_MODELS: Final = "the runs belong to different models"
+UNKNOWN_DIFFERENCE: Final = (
+    "these are not two runs of one model with the same loads and velocities"
+)
 # The motions of both runs are treated as equal if the momenta differ by at most this fraction [-].
 MOST_MOMENTUM_ERROR: Final = 0.05
 
@@ -41,21 +50,95 @@ def refuse_other_model(reference: OpenedRun, switched: OpenedRun) -> None:
     expected, part = differing[0]
     titles = f"{expected.title!r} in the reference run and {part.title!r} in the switched run"
     raise RangeError(
-        f"{', '.join(switched.sources)}: runs of different models: part {part.id} is {titles}; give the switched run "
-        "of this model"
+        f"{', '.join(switched.sources)}: {DIFFERENT_MODELS}: part {part.id} is {titles}; give the switched run of this "
+        "model"
     )
 
 
 def check_same_model(
-    reference: History, switched: History, first_rigid: float
+    reference: History,
+    switched: History,
+    first_rigid: float,
+    explain: Callable[[], str] = str,
 ) -> Iterator[str]:
-    """Yield an objection if the energies of two runs differ before the first state that may be rigid [time]."""
+    """Yield an objection if the energies of two runs differ before the first state that may be rigid [time].
+
+    ``explain`` returns what else is known of the two models, for example by `explain_difference`.
+    """
     difference = _measure_difference(reference, switched, -np.inf, first_rigid)
     if difference > _OF_ANOTHER_MODEL:
         yield (
-            f"the energies of the two runs differ by {difference:.0%} before {first_rigid:.6g}, when both are "
-            "deformable, so they seem to be runs of different models"
+            f"{explain() or UNKNOWN_DIFFERENCE}: the energies of the two runs differ by {difference:.0%} before "
+            f"{first_rigid:.6g}, when both are deformable{_compare_kinetic_energies(reference, switched)}"
         )
+
+
+def _compare_kinetic_energies(reference: History, switched: History) -> str:
+    """Return the kinetic energies at the start if they differ, so that the velocities differ; otherwise empty."""
+    start = max(reference.start, switched.start)
+    energies = [
+        float(np.interp(start, history.balance.time, history.balance.kinetic))
+        for history in (reference, switched)
+        if history.balance is not None and history.balance.kinetic is not None
+    ]
+    largest = max(energies, default=0.0)
+    if len(energies) < len((reference, switched)) or not largest:
+        return ""
+    expected, found = energies
+    if abs(expected - found) <= _OF_ANOTHER_MODEL * largest:
+        return ""
+    return (
+        f" (kinetic energy at {start:.6g}: {expected:.4g} in the reference run, {found:.4g} in the switched "
+        "run)"
+    )
+
+
+def explain_difference(reference: OpenedRun, switched: OpenedRun) -> str:
+    """Return whether two runs with different energies belong to the same model; empty if the files do not show it.
+
+    Parts and their masses decide. The titles of the runs are only a sign, because a user may edit the title of a
+    switched run.
+    """
+    parts = {part.id: part for part in reference.parts}
+    others = {part.id for part in switched.parts}
+    absent = [part for part in reference.parts if part.id not in others]
+    further = [part for part in switched.parts if part.id not in parts]
+    if parts and others and absent and further:
+        return (
+            f"{DIFFERENT_MODELS} (only the reference run has {_name_part(absent[0])}, only the switched run "
+            f"{_name_part(further[0])})"
+        )
+    masses = _pair_masses(reference, switched)
+    for id_, expected, mass in masses:
+        if abs(mass - expected) > _MOST_MASS_ERROR * expected:
+            return (
+                f"{DIFFERENT_MODELS} (the mass of {_name_part(parts[id_])} is {expected:.4g} in the reference run and "
+                f"{mass:.4g} in the switched run)"
+            )
+    titles = [run.databases[0].title for run in (reference, switched)]
+    if all(titles) and is_different_title(*titles):
+        return f"{DIFFERENT_MODELS}, it seems (the titles are {titles[0]!r} and {titles[1]!r})"
+    if masses:
+        return "the loads or velocities differ, but the masses of the parts do not"
+    return ""
+
+
+def _name_part(part: Part) -> str:
+    """Return the id of a part with its title."""
+    return f"part {part.id}{f' {part.title!r}' * bool(part.title)}"
+
+
+def _pair_masses(
+    reference: OpenedRun, switched: OpenedRun
+) -> list[tuple[int, float, float]]:
+    """Return the id of each common part with its masses in both runs, as far as they are known [mass]."""
+    masses = []
+    for run in (reference, switched):
+        values = () if run.masses is None else run.masses.tolist()
+        known = zip(run.parts, values, strict=False)
+        masses.append({part.id: mass for part, mass in known if mass > 0})
+    first, second = masses
+    return [(id_, mass, second[id_]) for id_, mass in first.items() if id_ in second]
 
 
 def check_before_window(

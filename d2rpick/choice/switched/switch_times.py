@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from d2rpick.base.errors import RangeError, format_ranges, list_names
+from d2rpick.choice.pair.decision import GIVE_SWITCHED_RUN_OF_MODEL
 from d2rpick.choice.switched.frozen import (
     FEWEST,
     compute_energy_range,
@@ -24,7 +25,7 @@ from d2rpick.flight.window import LAST_DIGIT
 from d2rpick.histories.samples import find_stretches
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from d2rpick.base.spans import Times
     from d2rpick.choice.question import Reference
@@ -131,11 +132,12 @@ def read_switch_times(
     windows: Sequence[SwitchedWindow],
     tr: float | None,
     td: float | None,
+    explain: Callable[[], str] = str,
 ) -> Times:
     """Complete tr and td with those of the nearest of the rigid ``windows`` of the switched run [time].
 
     If neither is given, the window is the first, because only the first can be compared in every case: what it freezes
-    changes the run after it.
+    changes the run after it. ``explain`` returns what is known of the models of the two runs if their energies differ.
 
     Raises
     ------
@@ -144,7 +146,7 @@ def read_switch_times(
         outside the record of the reference run.
     """
     if not windows:
-        raise _explain_why_no_times(switched, reference)
+        raise _explain_why_no_times(switched, reference, explain)
     if td is not None:
         window = min(windows, key=lambda window: abs(window.td - td))
     elif tr is not None:
@@ -177,13 +179,15 @@ def sort_windows(windows: Sequence[SwitchedWindow], pair: Times) -> SwitchedWind
     )
 
 
-def _explain_why_no_times(switched: Reference, reference: History) -> RangeError:
+def _explain_why_no_times(
+    switched: Reference, reference: History, explain: Callable[[], str]
+) -> RangeError:
     """Return the error that explains why no rigid window of a switched run is found."""
     early = reference.start + _EARLY * reference.duration
     history = switched.history
     source = ", ".join(history.source)
-    for reason in check_same_model(reference, history, early):
-        return RangeError(f"{source}: {reason}; give the switched run of this model")
+    for reason in check_same_model(reference, history, early, explain):
+        return RangeError(f"{source}: {reason}; {GIVE_SWITCHED_RUN_OF_MODEL}")
     reason, cure = _explain_missing_window(switched, reference)
     cure = history.left_beside or f"; {cure}"
     return RangeError(f"{source}: {reason}{cure}")

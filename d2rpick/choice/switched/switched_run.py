@@ -21,7 +21,7 @@ from d2rpick.base.errors import (
     list_names,
 )
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.choice.switched.frozen import FEWEST, find_frozen_times
+from d2rpick.choice.switched.frozen import FEWEST, RIGID_TIMES, find_frozen_times
 from d2rpick.flight.internal_energy import round_off
 from d2rpick.flight.momentum import find_complete_stretches
 from d2rpick.flight.window import LAST_DIGIT
@@ -44,6 +44,9 @@ if TYPE_CHECKING:
 _SHARP: Final = ("momentum", "contact-force", "contact-energy", "energy-balance")
 # Parts are treated as not moving if their momentum is at most this fraction of the model's momentum [-].
 _HARDLY: Final = 0.1
+# _LEAST_FROZEN: shortest window of frozen energy that shows a rigid part, as a fraction of the record [-].
+# _LEAST_SHARE: smallest frozen energy that shows a rigid part, relative to the largest energy of all parts [-].
+_LEAST_FROZEN, _LEAST_SHARE = 0.05, 0.01
 # A flight that seems to begin up to this many output intervals after tr may have begun before tr.
 _SAME_STATES: Final = 3
 
@@ -313,7 +316,7 @@ class RigidWindow(NamedTuple):
         when = f"from {self.start:.6g} to {self.end:.6g}"
         if self.whole:
             window_text = f"the parts were rigid {when}, within one output interval; the window is treated as done"
-            return Caution("rigid-times", window_text)
+            return Caution(RIGID_TIMES, window_text)
         names = _list_part_names(self.rigid)
         window_text = f"{when} these parts were rigid: {names}; the others deform, so the window is not done"
         return Caution("partly-rigid", window_text)
@@ -380,14 +383,19 @@ def _find_first_still_state(
     return int(others.max(initial=-1)) + 1
 
 
-def refuse_partly_rigid(reference: Reference, start: float | None, td: float) -> None:
+def refuse_partly_rigid(
+    reference: Reference, start: float | None, td: float
+) -> tuple[RigidWindow, ...]:
     """Raise RangeError if some of the chosen parts were rigid at some time from the start of the flight to td [time].
+
+    The result is all rigid windows of the run.
 
     Parts that rest have no kinetic energy either, but no frozen deformation. If ``start`` is unknown, the test begins
     at the start of the record.
     """
     earliest = reference.history.start if start is None else start
-    for window in find_absent_windows(reference):
+    windows = find_absent_windows(reference)
+    for window in windows:
         overlaps = window.end > earliest and window.start < td
         if overlaps and window.is_frozen and not window.whole:
             span = f"from {window.start:.6g} to {window.end:.6g}"
@@ -397,6 +405,56 @@ def refuse_partly_rigid(reference: Reference, start: float | None, td: float) ->
                 f"{source}: this is a switched run: these parts were rigid {span}: {names}; choose times from "
                 "the reference run, and compare this one with it (d2rpick verify)"
             )
+    return windows
+
+
+def warn_about_switched_run(
+    reference: Reference, windows: Sequence[RigidWindow], td: float
+) -> Iterator[Caution]:
+    """Yield a warning if the record up to td [time] is that of a switched run, whose reference run is needed.
+
+    ``windows`` are the windows in which parts have no kinetic energy. Solvers that write this energy show a rigid part
+    by its frozen internal energy alone.
+    """
+    rigid = [
+        (window.start, window.end, window.rigid)
+        for window in windows
+        if window.is_frozen and window.start < td
+    ] or [window for window in _find_frozen_parts(reference) if window[0] < td]
+    if not rigid:
+        return
+    spans = list_names(
+        [
+            f"{_list_part_names(parts)} from {start:.6g} to {end:.6g}"
+            for start, end, parts in rigid
+        ]
+    )
+    yield Caution(
+        RIGID_TIMES,
+        f"this is a switched run, with these rigid parts: {spans}; choose times from the reference run, or plan the "
+        "later windows with d2rpick plan",
+    )
+
+
+def _find_frozen_parts(
+    reference: Reference,
+) -> Iterator[tuple[float, float, tuple[Part, ...]]]:
+    """Yield the windows in which the energy of a single one of several chosen parts is frozen [time], with this part.
+
+    A short window, or that of a part with little energy, may be a coincidence of printed digits.
+    """
+    parts = _select_deformable(reference)
+    history = reference.history
+    energies = reference.run.part_energies(parts)
+    least = _LEAST_SHARE * float(energies.sum(axis=1).max())
+    for part, energy in zip(parts, energies.T, strict=True):
+        if energy.max() < least:
+            continue
+        of_part = replace(history, energy=energy)
+        for start, end in find_frozen_times(of_part):
+            level = float(np.interp(start, history.time, energy))
+            if end - start >= _LEAST_FROZEN * history.duration and level >= least:
+                yield start, end, (part,)
 
 
 def _find_frozen_windows(history: History) -> Iterator[RigidWindow]:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import COPY_AGAIN, RangeError
 from d2rpick.choice.parts.margins import find_margin
+from d2rpick.flight.chosen import shows_contact_at
 from d2rpick.flight.flight import (
     NEVER_FLIES,
     Flight,
@@ -142,10 +143,9 @@ def find_flights(history: History, settings: Settings) -> tuple[Flight, ...]:
     flights = _find_flights_without_landing(history, replace(settings, landing=None))
     last = _find_last_before(landing, flights)
     if last and landing <= last.within(history.time)[1]:
-        flights = tuple(
-            flight._replace(end=landing) if flight is last else flight
-            for flight in flights
-        )
+        shows_contact = shows_contact_at(history, last, landing)
+        ended = last._replace(end=landing, shows_contact=shows_contact)
+        flights = tuple(ended if flight is last else flight for flight in flights)
         return _add_given_start(history, settings, flights)
     from d2rpick.choice.pair.situation import examine_td
 

@@ -19,7 +19,9 @@ from d2rpick.base.errors import Caution
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.choice.answers import suggest_in_run
 from d2rpick.choice.health import WRONG_ENERGY, refuse_unsound, warn_about_engine
+from d2rpick.choice.pair.warnings import LANDING_NOT_SHOWN
 from d2rpick.choice.parts.margins import find_margin
+from d2rpick.choice.switched.frozen import RIGID_TIMES
 from d2rpick.choice.switched.switched_run import (
     DoneWindow,
     find_done_windows,
@@ -242,6 +244,8 @@ def plan_run(
     if min_rigid is None:
         judged = _leave_out_short(list(judged))
     rows = tuple(_mark_status(list(judged), done_rows))
+    if not done_times:
+        cautions = (*cautions, *_warn_about_switched_run(rows))
     cautions = (
         *cautions,
         *warn_about_engine(reference.run.sources),
@@ -442,6 +446,19 @@ def _warn_about_blocked(rows: Sequence[PlannedFlight]) -> Iterator[Caution]:
         yield Caution("longer-window-later", f"{text} {first.rigid_time:.3g}: {cure}")
 
 
+def _warn_about_switched_run(rows: Sequence[PlannedFlight]) -> Iterator[Caution]:
+    """Yield the warning that the record is that of a switched run, once for all flights."""
+    warnings = (
+        caution
+        for row in rows
+        for caution in (row.answer.cautions if row.answer else ())
+        if caution.code == RIGID_TIMES
+    )
+    first = next(warnings, None)
+    if first is not None:
+        yield first
+
+
 def _warn_about_windows(
     rows: Sequence[PlannedFlight], done_rows: Sequence[DoneWindow]
 ) -> Iterator[Caution]:
@@ -452,12 +469,12 @@ def _warn_about_windows(
             yield Caution("landed-rigid", window)
         elif done.flight is None:
             yield Caution("done-without-flight", window)
-    windows = [row for row in rows if row.status == "supported" and row.answer]
-    for row in windows:
+    for row in rows:
         for caution in row.answer.cautions if row.answer else ():
-            if (
-                caution.code == WRONG_ENERGY
-            ):  # This warning concerns the whole run, not a single flight.
+            # The first warning concerns the given landing, with or without a window before it; the others concern
+            # the whole run, not a single flight.
+            is_told = row.status == "supported" or caution.code == LANDING_NOT_SHOWN
+            if not is_told or caution.code in (WRONG_ENERGY, RIGID_TIMES):
                 continue
             which = f"flight {row.number}: " if len(rows) > 1 else ""
             yield caution._replace(message=which + caution.message)

@@ -545,6 +545,9 @@ def _list_times_by_modes(
     offered: list[float] = vertices(times, squares, best)[0].tolist()
     offered += vertices(times, squares, inner[-_MOST_PEAKS:])[0].tolist()
     offered.append(float(times[np.argmin(squares)]))
+    # A minimum that the end of the range cuts off is offered like one just before it.
+    if squares[-1] < squares[-2]:
+        offered.append(float(times[-1]))
     return [*dict.fromkeys(offered)]
 
 

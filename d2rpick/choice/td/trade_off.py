@@ -27,6 +27,7 @@ from d2rpick.choice.pair.quality import (
 )
 from d2rpick.choice.pair.situation import AnswerAtTd, Situation, make_look
 from d2rpick.choice.pair.warnings import warn_about_td
+from d2rpick.choice.switched.frozen import RIGID_TIMES
 from d2rpick.choice.td.flights import find_longest_flight
 from d2rpick.choice.td.suggest_td import (
     STEPS,
@@ -373,6 +374,9 @@ def _warn_about_window(
     suggestion: PairSuggestion,
 ) -> Iterator[Caution]:
     """Yield the warnings about the td range; a warning about a single td belongs to the proposal for this td."""
+    yield from (
+        caution for caution in suggestion.cautions if caution.code == RIGID_TIMES
+    )
     of_td = {"poor-td", "td-in-load", "td-after-contact", "no-energy", "at-rest"}
     yield from (
         caution for caution in warn_about_td(situation) if caution.code not in of_td

@@ -76,21 +76,26 @@ def open_legs(sources: Sequence[Source], selection: Selection) -> list[Database]
 def _open_leg(source: Source, selection: Selection) -> Database:
     """Open one file as a saved binout or as a file of columns."""
     _import_library(source.name)
+    import h5py
+
     # The file is read into memory, because a change on disk during the read could crash the library.
-    file = io.BytesIO(bytes(source.data))
+    content = bytes(source.data)
+    file = io.BytesIO(content)
     check_file(file, source.name)
+    with _explain_damage(source.name):
+        opened = h5py.File(file, "r")
     if not selection.time and not selection.energy:
-        branches = _open_branches(file, source.name)
+        branches = _open_branches(opened, source.name)
         if branches:
             return SavedBinout(source.name, branches)
-    return Columns(file, source.name, selection)
+    return Columns(opened, content, source.name, selection)
 
 
-def _open_branches(file: io.BytesIO, source: str) -> dict[str, PartGroup]:
+def _open_branches(opened: h5py.File, source: str) -> dict[str, PartGroup]:
     """Open the glstat and matsum branches that lasso-python saved; empty for a file with another layout."""
-    with _open_hdf5(file, source) as opened:
+    with _explain_damage(source):
         return {
-            name: PartGroup(file, source, opened, name)
+            name: PartGroup(source, opened[name])
             for name in _BRANCHES
             if f"{name}/time" in opened
             and f"{name}/internal_energy" in opened
@@ -104,9 +109,11 @@ class Columns(Database):
     format = "hdf5"
     named_by_people = True
 
-    def __init__(self, file: io.BytesIO, source: str, selection: Selection) -> None:
-        self._file, self.source = file, source
-        with _open_hdf5(file, source) as opened:
+    def __init__(
+        self, opened: h5py.File, content: bytes, source: str, selection: Selection
+    ) -> None:
+        self._opened, self._content, self.source = opened, content, source
+        with _explain_damage(source):
             self._columns = find_columns(opened)
         self._named_time: Column | None = None
         if selection.time:
@@ -204,8 +211,8 @@ class Columns(Database):
 
     def _load(self, column: Column) -> Samples:
         """Return the values of a column, shape (size,)."""
-        with _open_hdf5(self._file, self.source) as opened:
-            return column.load(opened, self._file.getvalue(), self.source)
+        with _explain_damage(self.source):
+            return column.load(self._opened, self._content, self.source)
 
 
 class SavedBinout(Database):
@@ -232,11 +239,9 @@ class SavedBinout(Database):
 class PartGroup(Database):
     """The glstat or matsum branch of a file saved by lasso-python."""
 
-    def __init__(
-        self, file: io.BytesIO, source: str, opened: h5py.File, name: str
-    ) -> None:
-        self._file, self.source, self.name = file, source, name
-        group = opened[name]
+    def __init__(self, source: str, group: h5py.Group) -> None:
+        self.source, self._group = source, group
+        self.name = group.name.strip("/")
         self.title = _read_line(group, "title")
         self.version = " ".join(
             text
@@ -245,7 +250,7 @@ class PartGroup(Database):
         )
         check_data(group["time"], source)
         self.time: Samples = check_finite(
-            group["time"][()], f"{name}/time", source
+            group["time"][()], f"{self.name}/time", source
         ).reshape(-1)
         if "ids" in group:
             self.parts = _read_parts(group, source)
@@ -264,8 +269,8 @@ class PartGroup(Database):
             raise FormatError(
                 f"{self.source}: {self.name} has no channel {name!r}, only {', '.join(self.channels)}"
             )
-        with _open_hdf5(self._file, self.source) as opened:
-            return self._load(opened[self.name], name, (self.time.size,))
+        with _explain_damage(self.source):
+            return self._load(name, (self.time.size,))
 
     def part_channel(self, quantity: str, ids: Sequence[int]) -> Samples:
         """Return a quantity of the parts ``ids``, shape (n, len(ids))."""
@@ -276,22 +281,21 @@ class PartGroup(Database):
                 f"{self.source}: {self.name} has not exactly one part {', '.join(map(str, missing))}; "
                 f"choose from {', '.join(map(str, part_ids)) or 'none'}"
             )
-        with _open_hdf5(self._file, self.source) as opened:
-            group = opened[self.name]
-            if quantity not in group:
+        with _explain_damage(self.source):
+            if quantity not in self._group:
                 raise FormatError(f"{self.source}: {self.name} has no {quantity}")
-            values = self._load(group, quantity, (self.time.size, len(part_ids)))
+            values = self._load(quantity, (self.time.size, len(part_ids)))
         return values[:, [part_ids.index(id_) for id_ in ids]]
 
-    def _load(self, group: h5py.Group, name: str, shape: tuple[int, ...]) -> Samples:
+    def _load(self, name: str, shape: tuple[int, ...]) -> Samples:
         """Return the dataset ``name`` in this ``shape``; the file may lack axes of length 1."""
-        dataset = group[name]
+        dataset = self._group[name]
         check_data(dataset, self.source)
         if [size for size in dataset.shape if size != 1] != [
             size for size in shape if size != 1
         ]:
             raise FormatError(
-                f"{self.source}: {dataset.name} has shape {dataset.shape}, {shape} was expected"
+                f"{self.source}: {dataset.name} has shape {dataset.shape}, but {shape} was expected"
             )
         return check_finite(dataset[()], dataset.name, self.source).reshape(shape)
 
@@ -377,7 +381,7 @@ def _choose_only_column(
     paths = [f"{column.path} ({column.size})" for column in fitting or columns]
     menu = list_names(paths, most=_MANY) or "there is none"
     raise FormatError(
-        f"{source}: {count} for {purpose}, one was expected; give its path: {menu}"
+        f"{source}: {count} for {purpose}, but one was expected; give its path: {menu}"
     )
 
 
@@ -392,13 +396,10 @@ def _import_library(source: str) -> None:
 
 
 @contextmanager
-def _open_hdf5(file: io.BytesIO, source: str) -> Iterator[h5py.File]:
-    """Open the file, and turn any h5py error about a damaged file into a FormatError."""
-    import h5py
-
+def _explain_damage(source: str) -> Iterator[None]:
+    """Turn any h5py error about a damaged file into a FormatError."""
     try:
-        with h5py.File(file, "r") as opened:
-            yield opened
+        yield
     except _DAMAGED as error:
         reason = make_printable(" ".join(str(error).split()))
         raise FormatError(
