@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 from collections.abc import Iterable, Mapping, Set
 from typing import TYPE_CHECKING, Any, Final, NoReturn
 
@@ -30,6 +31,9 @@ if TYPE_CHECKING:
 
 # Largest number of characters of an invalid value that are shown in a message.
 _LONGEST_SHOWN: Final = 60
+# Smallest number above 1 that is read as a percentage, and the number that is the whole.
+_LEAST_PERCENT: Final = 2
+_WHOLE: Final = 100
 
 
 def check_number(name: str, value: object, limits: Number = TIME) -> float:
@@ -41,17 +45,17 @@ def check_number(name: str, value: object, limits: Number = TIME) -> float:
     1.0
     >>> check_number("margin", -1, Number(0.0))
     Traceback (most recent call last):
-    ValueError: margin is -1, a number of at least 0 was expected
+    ValueError: margin is -1, but a number of at least 0 was expected
     """
     if not is_number(value):
         raise TypeError(
-            f"{name} is {_format_wrong_value(value)}, a number was expected{suggest_without_unit(value)}"
+            f"{name} is {_format_wrong_value(value)}, but a number was expected{suggest_without_unit(value)}"
         )
     converted = float(value)  # type: ignore[arg-type]  # is_number() excludes other types
     if not math.isfinite(converted):
-        raise ValueError(f"{name} is {converted}, a finite number was expected")
+        raise ValueError(f"{name} is {converted}, but a finite number was expected")
     if limit := limits.missed(converted):
-        raise ValueError(f"{name} is {converted:g}, a number {limit} was expected")
+        raise ValueError(f"{name} is {converted:g}, but a number {limit} was expected")
     return converted
 
 
@@ -97,7 +101,7 @@ def check_flag(name: str, value: object, default: bool) -> bool:
     kind = getattr(getattr(value, "dtype", None), "kind", "")
     if not isinstance(value, bool) and (kind != "b" or getattr(value, "ndim", 0)):
         raise TypeError(
-            f"{name} is {_format_wrong_value(value)}, True or False was expected"
+            f"{name} is {_format_wrong_value(value)}, but True or False was expected"
         )
     return bool(value)
 
@@ -119,7 +123,7 @@ def check_windows(name: str, value: object) -> list[tuple[float, float]]:
         times = check_time_window(f"{name}[{number_of_pair}]", pair)
         if times is None:
             raise TypeError(
-                f"{name}[{number_of_pair}] is None, a pair of times was expected"
+                f"{name}[{number_of_pair}] is None, but a pair of times was expected"
             )
         windows.append(times)
     return windows
@@ -152,6 +156,32 @@ def suggest_without_unit(value: object) -> str:
     if seconds is None:
         return ""
     return f": give a number in the unit of the run, {seconds:g} if it is s"
+
+
+def suggest_seconds(value: object) -> str:
+    """Explain how to write a time by the clock that was given with a unit; return "" for any other string.
+
+    Examples
+    --------
+    >>> suggest_seconds("5s"), suggest_seconds("five")
+    (': give the seconds as a number, 5', '')
+    """
+    from d2rpick.histories.digits import parse_seconds
+
+    seconds = parse_seconds(str(value))
+    return "" if seconds is None else f": give the seconds as a number, {seconds:g}"
+
+
+def suggest_share(number: float) -> str:
+    """Explain how to write a fraction if a number above 1 looks like a percentage; return "" for any other number.
+
+    Examples
+    --------
+    >>> suggest_share(20.0), suggest_share(1.5), suggest_share(-3.0)
+    ('; for 20% write 0.2', '', '')
+    """
+    is_percentage = _LEAST_PERCENT <= number <= _WHOLE
+    return f"; for {number:g}% write {number / _WHOLE:g}" if is_percentage else ""
 
 
 def suggest_without_percent(value: object, *, is_time: bool) -> str:
@@ -193,7 +223,7 @@ def check_time_window(name: str, value: object) -> tuple[float, float] | None:
         return None
     if not _is_pair(value):
         raise TypeError(
-            f"{name} is {_format_wrong_value(value)}, a pair of times was expected"
+            f"{name} is {_format_wrong_value(value)}, but a pair of times was expected"
         )
     first, last = list(value)  # type: ignore[call-overload]  # _is_pair() excludes other types
     times = check_number(f"{name}[0]", first), check_number(f"{name}[1]", last)
@@ -270,11 +300,11 @@ def check_whole_number(name: str, value: object, low: int) -> int:
     --------
     >>> check_whole_number("steps", 2.5, 1)
     Traceback (most recent call last):
-    TypeError: steps is 2.5, a whole number was expected
+    TypeError: steps is 2.5, but a whole number was expected
     """
     if not is_whole_number(value):
         raise TypeError(
-            f"{name} is {_format_wrong_value(value)}, a whole number was expected"
+            f"{name} is {_format_wrong_value(value)}, but a whole number was expected"
         )
     return int(check_number(name, value, Number(low)))
 
@@ -345,7 +375,7 @@ def check_option(name: str, value: object, option: Option, default: Any = None) 
     --------
     >>> check_option("min_quality", "best", OPTIONS["min_quality"])
     Traceback (most recent call last):
-    ValueError: min_quality is 'best', one of poor, fair, good was expected
+    ValueError: min_quality is 'best', but one of poor, fair, good was expected
     """
     kind: Any = option.kind
     if value is None:
@@ -363,10 +393,12 @@ def check_option(name: str, value: object, option: Option, default: Any = None) 
     if isinstance(kind, Number):
         return check_number(name, value, kind)
     if not isinstance(value, str):
-        raise TypeError(f"{name} is {_format_wrong_value(value)}, a text was expected")
+        raise TypeError(
+            f"{name} is {_format_wrong_value(value)}, but a text was expected"
+        )
     if isinstance(kind, tuple) and value not in kind:
         raise ValueError(
-            f"{name} is {_format_wrong_value(value)}, one of {', '.join(kind)} was expected"
+            f"{name} is {_format_wrong_value(value)}, but one of {', '.join(kind)} was expected"
         )
     return value
 
@@ -399,7 +431,7 @@ def check_two_whole_numbers(name: str, value: object, low: int) -> tuple[int, in
     """Return two whole numbers that are at least ``low``."""
     if not _is_pair(value):
         raise TypeError(
-            f"{name} is {_format_wrong_value(value)}, a pair of numbers was expected"
+            f"{name} is {_format_wrong_value(value)}, but a pair of numbers was expected"
         )
     first, second = list(value)  # type: ignore[call-overload]  # _is_pair() excludes other types
     return check_whole_number(name, first, low), check_whole_number(name, second, low)
@@ -413,7 +445,7 @@ def _check_oscillator(value: object) -> Oscillator | None:
 
     if not isinstance(value, Oscillator):
         raise TypeError(
-            f"oscillator is {_format_wrong_value(value)}, a d2rpick.Oscillator was expected"
+            f"oscillator is {_format_wrong_value(value)}, but a d2rpick.Oscillator was expected"
         )
     return value
 
@@ -429,7 +461,7 @@ def check_weights(value: object) -> Any:
 
     if not isinstance(value, Weights):
         raise TypeError(
-            f"weights is {_format_wrong_value(value)}, d2rpick.Weights or the name of a file was expected"
+            f"weights is {_format_wrong_value(value)}, but d2rpick.Weights or the name of a file was expected"
         )
     return value
 
@@ -451,7 +483,7 @@ def check_path(name: str, value: Path) -> str:
     """Return the name of a single file."""
     names = list_paths(name, value)
     if len(names) > 1:
-        raise ValueError(f"{name} names {len(names)} files, one was expected")
+        raise ValueError(f"{name} names {len(names)} files, but one was expected")
     return names[0]
 
 
@@ -475,18 +507,34 @@ def read_windows(text: str, source: str) -> tuple[tuple[float, float], ...]:
         words = line.split()
         if not words or words[0].startswith("#"):
             continue
+        place = f"{source}:{number}"
         try:
             tr, td = map(float, words)
         except ValueError:
             raise DeckError(
-                f"{source}:{number}: {line.strip()[:60]!r} was found, two numbers 'tr td' were expected"
+                f"{place}: {line.strip()[:60]!r} was found, but two numbers 'tr td' were expected; "
+                f"{_correct_line(line)}"
             ) from None
+        if tr > td:
+            raise DeckError(
+                f"{place}: tr = {tr:g} lies after td = {td:g}; write the earlier time first"
+            )
         windows.append((tr, td))
     if not windows:
         raise DeckError(
-            f"{source}: no window was found, a line 'tr td' for each was expected"
+            f"{source}: no window was found, but a line 'tr td' for each was expected"
         )
     return tuple(windows)
+
+
+def _correct_line(line: str) -> str:
+    """Return how to correct a line that is not two numbers separated by blanks."""
+    words = re.split(r"[\s,;]+", line.strip())
+    try:
+        tr, td = map(float, words)
+    except ValueError:
+        return "put # before headings and remarks, or give the journal of d2rpick drive, drive.ndjson"
+    return f"separate them by a blank: {tr:g} {td:g}"
 
 
 def _read_journal(text: str) -> list[tuple[float, float]]:

@@ -9,7 +9,6 @@ from d2rpick.base.errors import Caution, DeckError, list_names
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from d2rpick.api.asked import RunQuestion
     from d2rpick.deck.printed_card import PrintedCard
     from d2rpick.histories.names import Part
 
@@ -45,16 +44,19 @@ def warn_about_lead(
 
 
 def collect_objections(
-    card: PrintedCard, question: RunQuestion, parts: int, lead: int | None
+    card: PrintedCard,
+    deck: str | None,
+    parts: int,
+    lead: int | None = None,
+    known_parts: Sequence[Part] | None = None,
 ) -> Iterator[Caution]:
     """Yield the findings of ``check`` for the deck with the card or, without a deck, warnings about what is unknown.
 
-    ``parts`` is the number of parts that the card switches by their ids, and ``lead`` the part into which they are
-    merged.
+    ``parts`` is the number of parts that the card switches by their ids, ``lead`` the part into which they are merged,
+    and ``known_parts`` are the parts of the history.
     """
-    if question.deck is None:
-        run = question.reference.run
-        yield from warn_about_lead(lead, (), run.parts)
+    if deck is None:
+        yield from warn_about_lead(lead, (), known_parts)
         if parts > 1:
             message = "without a deck of the run it is unknown whether these parts share nodes"
             yield Caution(
@@ -70,7 +72,7 @@ def collect_objections(
 
     with TemporaryDirectory() as folder:
         try:
-            checked = check_deck(write_deck(question.deck, card, folder)[0])
+            checked = check_deck(write_deck(deck, card, folder)[0])
         except DeckError as error:
             yield Caution(
                 ERROR_OF_CARD, f"the card does not fit into the deck: {error}"

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from d2rpick.api.choosing import JudgingOptions
     from d2rpick.api.runs import Run
     from d2rpick.deck.printed_card import CardSolver as Module, Printing
+    from d2rpick.flight.position_error import RigidBody
 
 # This pattern is compiled at its first use, to keep start-up fast.
 _RANGE: Final = r"(\d{1,10})(?:\s*-\s*(\d{1,10}))?"
@@ -86,7 +87,7 @@ def explain_unknown_solver(name: object) -> str:
 
     solvers = list_solvers()
     near = suggest_name(str(name), solvers)
-    return f"{name!r} was found{near}, one of {', '.join(solvers)} was expected"
+    return f"{name!r} was found{near}, but one of {', '.join(solvers)} was expected"
 
 
 @dataclass(eq=False, repr=False)
@@ -205,38 +206,45 @@ class Cards:
         """
         from d2rpick.deck.printing import find_solver
 
-        parts = parse_id_ranges("--part", question.on_card)
-        printing, notes = self._suit_deck(question, parts)
-        printing = self.replace_in(printing, parts)
+        printing, notes = self._suit_question(question)
         history_format = question.reference.history.format
         self.check_solver(printing.solver or find_solver(history_format))
         return printing, notes
 
-    def _suit_deck(
-        self, question: RunQuestion, parts_on_card: Sequence[int]
-    ) -> tuple[Printing, tuple[str, ...]]:
-        """Return what the deck of the run requires of a card, with notes on rigid bodies that the deck lacks.
-
-        ``parts_on_card`` contains the parts to be switched if the history has no parts.
-
-        The deck defines the solver, the name and end of the run, free ids, the constraints that have to be deleted, and
-        the rigid bodies that switch the parts.
-        """
+    def _suit_question(self, question: RunQuestion) -> tuple[Printing, tuple[str, ...]]:
+        """Return the options of a card, completed with what the deck of the run requires of it, with notes."""
         from d2rpick.deck.printed_card import Printing
 
-        printing = Printing()
-        deck = question.deck
-        if deck is None:
+        on_card = parse_id_ranges("--part", question.on_card)
+        if question.deck is None:
             name = find_run_name(question.reference.history.source)
-            return printing._replace(name=name or printing.name), ()
+            printing = Printing()
+            printing = printing._replace(name=name or printing.name)
+            return self.replace_in(printing, on_card), ()
+        history_parts = question.reference.history.parts or ()
+        parts = on_card or [part.id for part in history_parts]
+        bodies = find_bodies_on_card(question, parts) or ()
+        printing, notes = self.suit_deck(question.deck, parts, bodies)
+        return self.replace_in(printing, on_card), notes
+
+    def suit_deck(
+        self, deck: str, parts: Sequence[int], bodies: Sequence[RigidBody]
+    ) -> tuple[Printing, tuple[str, ...]]:
+        """Return what a deck requires of a card that switches ``parts``, with notes on missing rigid bodies.
+
+        The deck defines the solver, the name and end of the run, free ids, the constraints that have to be deleted, and
+        the rigid bodies that switch the parts. The parts become the rigid ``bodies``, unless the card merges all parts.
+        """
+        from d2rpick.deck.printed_card import Printing
         from d2rpick.deck.printing import SOLVERS
         from d2rpick.deck.suiting import find_suiting
 
-        history_parts = question.reference.history.parts or ()
-        parts = parts_on_card or [part.id for part in history_parts]
-        suiting = find_suiting(deck, parts)
+        joined = [body.parts for body in bodies]
+        if self.merge is not None:
+            joined = [(*parts, self.merge)]
+        suiting = find_suiting(deck, parts, joined)
         solver = self.solver or suiting.solver
-        printing = printing._replace(solver=solver)
+        printing = Printing(solver=solver)
         if SOLVERS[solver].title != SOLVERS[suiting.solver].title:
             return printing, ()
         if suiting.solver == "ls-dyna":
@@ -244,6 +252,8 @@ class Cards:
                 swset=suiting.swset or printing.swset,
                 delete_nodal_bodies=suiting.delete_nodal_bodies,
                 delete_node_sets=suiting.delete_node_sets,
+                parting=suiting.parting,
+                kept_joints=suiting.kept_joints,
             ), ()
         name = suiting.name or printing.name
         printing = printing._replace(name=name, end=suiting.end)
@@ -253,13 +263,13 @@ class Cards:
             return printing, ()
         from d2rpick.deck.radioss_bodies import find_bodies
 
-        bodies = find_bodies(deck, parts)
+        found = find_bodies(deck, parts)
         return printing._replace(
-            node=tuple(bodies.nodes),
-            replaced=bodies.replaced,
-            starter=bodies.cards,
-            sensor=bodies.sensor,
-        ), bodies.notes
+            node=tuple(found.nodes),
+            replaced=found.replaced,
+            starter=found.cards,
+            sensor=found.sensor,
+        ), found.notes
 
     def _refuse_unknown_nodes(self, deck: str) -> None:
         """Raise DeckError if a main node belongs to no rigid body of the deck: the engine would skip it silently."""
@@ -276,6 +286,18 @@ class Cards:
             )
 
 
+def find_bodies_on_card(
+    question: RunQuestion, parts: Sequence[int]
+) -> tuple[RigidBody, ...] | None:
+    """Return the rigid bodies that the parts of a card become according to the deck; None if there is no deck."""
+    if question.on_card and question.model and question.deck:
+        # Imported here to keep start-up fast.
+        from d2rpick.choice.parts.deck_of_run import find_rigid_bodies
+
+        return find_rigid_bodies(question.model.inventory, parts)
+    return question.settings.bodies
+
+
 # Keys of the settings that apply to all commands. All other keys apply to the rules or to a single command.
 SETTINGS: Final = (*map(make_option_name, (*OPTIONS, *list_options(Cards))), "fail-on")
 
@@ -289,8 +311,13 @@ def name_needed_argument(solver: Module) -> str:
     return f"a card for {solver.title} needs {arguments_by_kind[solver.switches]}"
 
 
-def parse_id_ranges(name: str, texts: Sequence[str]) -> list[int]:
-    """Return the ids given as numbers and ranges. Without a history, all ids in a range are assumed to exist."""
+def parse_id_ranges(
+    name: str, texts: Sequence[str], *, takes_history: bool = True
+) -> list[int]:
+    """Return the ids given as numbers and ranges. Without a history, all ids in a range are assumed to exist.
+
+    Messages name the option --history only if the command ``takes_history``.
+    """
     ids: list[int] = []
     for piece in (piece.strip() for text in texts for piece in text.split(",")):
         match = re.fullmatch(_RANGE, piece, re.ASCII)
@@ -301,8 +328,10 @@ def parse_id_ranges(name: str, texts: Sequence[str]) -> list[int]:
                 )
             if piece.isdecimal():
                 hint = "; an id has at most 10 digits"
-            elif name == "--part":
+            elif name == "--part" and takes_history:
                 hint = "; titles need a --history that has parts"
+            elif name == "--part":
+                hint = "; give the ids of parts in the deck"
             else:
                 hint = ""
             raise ArgumentError(
@@ -312,11 +341,15 @@ def parse_id_ranges(name: str, texts: Sequence[str]) -> list[int]:
         high = int(match[2] or match[1])
         if low == 0:
             raise ArgumentError(
-                f"{name}: {piece!r} does not fit, ids from 1 were expected; give those that the deck lists"
+                f"{name}: {piece!r} does not fit, but ids from 1 were expected; give those that the deck lists"
             )
-        if not low <= high < low + _MOST_IDS:
+        if high < low:
             raise ArgumentError(
-                f"{name}: {piece!r} is not a range of 1 to {_MOST_IDS} numbers"
+                f"{name}: the range {piece!r} is reversed; give the smaller number first, {high}-{low}"
+            )
+        if not high < low + _MOST_IDS:
+            raise ArgumentError(
+                f"{name}: {piece!r} holds more than {_MOST_IDS} numbers; give shorter ranges"
             )
         ids += range(low, high + 1)
     return ids

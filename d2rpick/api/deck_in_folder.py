@@ -5,7 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
-from d2rpick.base.errors import ArgumentError, Caution, list_names
+from d2rpick.base.errors import (
+    SEVERAL_RUNS,
+    ArgumentError,
+    Caution,
+    FormatError,
+    list_names,
+)
 
 if TYPE_CHECKING:
     from d2rpick.api.request import Request
@@ -28,14 +34,26 @@ def find_deck_in_folder(request: Request) -> Request:
 
     decks = find_decks_of_run(folder)
     if len(decks) > 1:
-        raise ArgumentError(
-            f"{folder}: {len(decks)} main decks ({list_names(decks, most=5)}); name the deck of the run with `deck`,"
-            " or use none with `no_deck`"
-        )
+        problem = f"{folder}: this folder contains {len(decks)} main decks ({list_names(decks, most=5)})"
+        cure = "name the deck of the run with `deck`, or use none with `no_deck`"
+        raise ArgumentError(f"{problem}{_describe_several_runs(folder)}; {cure}")
     if not decks:
         request.check_deck()
         return request
     return replace(request, deck=decks[0], deck_in_folder=True)
+
+
+def _describe_several_runs(folder: str) -> str:
+    """Return that a folder has the files of several runs too, so that one message names both; otherwise empty."""
+    from d2rpick.histories.source import expand  # Imported here to keep start-up fast.
+
+    try:
+        expand([folder])
+    except FormatError as error:
+        if SEVERAL_RUNS in str(error):
+            reason = str(error).removeprefix(f"{folder}: this folder contains ")
+            return f" and {reason}"
+    return ""
 
 
 def name_deck(request: Request) -> tuple[Caution, ...]:

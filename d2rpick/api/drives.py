@@ -81,7 +81,7 @@ class Driving:
         self.name, self.folder, self._report = deck, folder, report
         self.commands = Commands(starter, engine, threads)
         self.deck = read_driven_deck(
-            deck, parse_id_ranges("--part", part) if part else ()
+            deck, parse_id_ranges("--part", part, takes_history=False) if part else ()
         )
         self.inventory = read_inventory(deck)
         if wait is not None:
@@ -131,6 +131,11 @@ class Driving:
             journal = Journal(folder / JOURNAL)
             digest = hashlib.sha256(b"\0".join(self.deck.files.values())).hexdigest()
             begun = journal.records[:1]
+            if resume and not begun:
+                raise D2RPickError(
+                    f"{folder}: there is no run to resume in this folder; give the folder of the run, or leave out "
+                    "--resume to begin one"
+                )
             computed = journal.has("ended")
             if computed and not resume:
                 raise D2RPickError(
@@ -161,6 +166,14 @@ class Driving:
                 raise D2RPickError(
                     f"{folder}: {error.strerror}; make room, then --resume"
                 ) from None
+
+    def refuse_other_files(self) -> None:
+        """Raise D2RPickError if the folder of the run exists and contains files, but no run that was begun."""
+        folder = self.folder
+        if not folder.is_dir() or (folder / JOURNAL).exists():
+            return
+        if any(not file.name.startswith(".") for file in folder.iterdir()):
+            raise D2RPickError(f"{folder}: the folder is not empty; choose another one")
 
     def answer(self, driver: Driver, command: Sequence[str]) -> Drive:
         """Return the result for the part of the run that has been computed."""

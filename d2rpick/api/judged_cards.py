@@ -7,7 +7,12 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, Final, Unpack
 
 from d2rpick.api.card_in_deck import ERROR_OF_CARD, warn_about_lead
-from d2rpick.api.cards import Cards, name_needed_argument, parse_id_ranges
+from d2rpick.api.cards import (
+    Cards,
+    find_bodies_on_card,
+    name_needed_argument,
+    parse_id_ranges,
+)
 from d2rpick.api.request import CHOOSING_FOR_CARDS, Request
 from d2rpick.base.errors import ArgumentError, Caution
 from d2rpick.base.options import list_options
@@ -29,6 +34,12 @@ if TYPE_CHECKING:
 _ONLY_JUDGED: Final = (
     "a card for {} switches the rigid bodies of `node`; `parts` only selects the energy by which it is judged, so omit "
     "it, or give a `run` with parts"
+)
+
+_NEEDS_END: Final = "a card for {} needs `end`, the end of the run, or a `run`"
+_NOT_JUDGED: Final = (
+    "NOT JUDGED: no history of a reference run was given, so nothing shows whether these "
+    "times are good."
 )
 
 
@@ -104,25 +115,29 @@ def judge_and_print(
         raise ArgumentError(name_needed_argument(solver))
     card, verdicts = result
     card = replace(card, notes=(*notes, *card.notes))
-    if printing.merge or solver.switches != "part":
-        apart = 0
-    else:
-        apart = len(printing.part)
-    objections = collect_objections(card, question, apart, printing.merge)
-    return JudgedCard(card, verdicts, tuple(objections))
+    apart = _count_separate_parts(printing)
+    cautions = tuple(
+        collect_objections(
+            card, question.deck, apart, printing.merge, reference.run.parts
+        )
+    )
+    return JudgedCard(card, verdicts, cautions)
+
+
+def _count_separate_parts(printing: Printing) -> int:
+    """Return the number of parts that a card switches by their ids without merging them."""
+    from d2rpick.deck.printing import DEFAULT, SOLVERS
+
+    solver = SOLVERS[printing.solver or DEFAULT]
+    return 0 if printing.merge or solver.switches != "part" else len(printing.part)
 
 
 def _add_bodies(printing: Printing, question: RunQuestion) -> Printing:
     """Add the rigid bodies that the parts of a card become according to the deck."""
     from d2rpick.choice.judged_card import add_deck_bodies
 
-    settings = question.settings
-    if question.on_card and question.model and question.deck:
-        from d2rpick.choice.parts.deck_of_run import find_rigid_bodies
-
-        bodies = find_rigid_bodies(question.model.inventory, printing.part)
-        settings = replace(settings, bodies=bodies)
-    return add_deck_bodies(printing, settings)
+    bodies = find_bodies_on_card(question, printing.part)
+    return add_deck_bodies(printing, replace(question.settings, bodies=bodies))
 
 
 def collect_cautions(card: JudgedCard) -> tuple[Caution, ...]:
@@ -203,21 +218,32 @@ def card(
 
 
 def print_card(
-    windows: Sequence[Times], run: Run | None, request: Request, cards: Cards
+    windows: Sequence[Times],
+    run: Run | None,
+    request: Request,
+    cards: Cards,
+    listed_in: str = "",
 ) -> JudgedCard:
-    """Print the card for windows. If a run is given, judge the printed times with it."""
+    """Print the card for windows. If a run is given, judge the printed times with it.
+
+    Messages on times in another unit name the file that the windows are ``listed_in``.
+    """
     from d2rpick.deck.printing import SOLVERS, find_solver, print_cards
 
     if run is None:
         if request.deck:
             _refuse_history_as_deck(request.deck)
         request.without_history()
+        if request.deck is not None:
+            return _print_in_deck(windows, request.deck, request, cards)
         printing = _complete_alone(request, cards)
         unknown_lead = warn_about_lead(printing.merge, printing.part)
         return JudgedCard(print_cards(windows, printing), cautions=tuple(unknown_lead))
     from d2rpick.api.asked import ask_run  # Imported here to keep start-up fast.
 
     question = ask_run(run, request, card_alone=True)
+    for tr, td in windows:
+        question.reference.history.check_pair(tr, td, listed_in)
     solver = cards.solver or find_solver(question.reference.history.format)
     cards.check_solver(solver)
     parts = parse_id_ranges("--part", question.on_card)
@@ -233,8 +259,56 @@ def _refuse_history_as_deck(name: str) -> None:
     SourceFile(name).refuse_history()
 
 
+def _print_in_deck(
+    windows: Sequence[Times], deck: str, request: Request, cards: Cards
+) -> JudgedCard:
+    """Print the card for windows that no history judges, and check the deck with the card."""
+    from d2rpick.api.card_in_deck import collect_objections
+    from d2rpick.choice.parts.deck_of_run import (
+        find_rigid_bodies,
+        warn_about_bodies,
+        warn_about_solver,
+    )
+    from d2rpick.deck import read_inventory
+    from d2rpick.deck.printing import print_cards
+
+    inventory = read_inventory(deck)
+    parts = parse_id_ranges("--part", request.part)
+    bodies = find_rigid_bodies(inventory, parts)
+    printing, notes = cards.suit_deck(deck, parts, bodies)
+    printing = cards.replace_in(printing, parts)
+    replaced = (*printing.node, *printing.replaced)
+    printing = printing._replace(
+        bodies=tuple(body.parts for body in bodies),
+        off=tuple(node for node in inventory.kept_off if node not in replaced),
+    )
+    _require_switched(printing, cards)
+    card = print_cards(windows, printing, [_NOT_JUDGED])
+    card = replace(card, notes=(*notes, *card.notes))
+    cautions = (
+        *warn_about_bodies(parts, inventory),
+        *warn_about_solver(parts, inventory),
+        *collect_objections(card, deck, _count_separate_parts(printing)),
+    )
+    return JudgedCard(card, (), cautions)
+
+
+def _require_switched(printing: Printing, cards: Cards) -> None:
+    """Raise ArgumentError if it is unknown which parts or bodies a card switches, or when the run ends."""
+    from d2rpick.choice.judged_card import list_switched
+    from d2rpick.deck.printing import DEFAULT, SOLVERS
+
+    solver = printing.solver or DEFAULT
+    cards.check_solver(solver)
+    module = SOLVERS[solver]
+    if not list_switched(printing):
+        raise ArgumentError(name_needed_argument(module))
+    if "end" in module.takes and printing.end is None:
+        raise ArgumentError(_NEEDS_END.format(module.title))
+
+
 def _complete_alone(request: Request, cards: Cards) -> Printing:
-    """Return the options of a card without a history; raise ArgumentError if an option is missing."""
+    """Return the options of a card without a history and a deck; raise ArgumentError if an option is missing."""
     from d2rpick.deck.printed_card import Printing
     from d2rpick.deck.printing import DEFAULT, SOLVERS
 
@@ -246,7 +320,5 @@ def _complete_alone(request: Request, cards: Cards) -> Printing:
     if request.part and module.switches != "part":
         raise ArgumentError(_ONLY_JUDGED.format(module.title))
     if "end" in module.takes and cards.end is None:
-        raise ArgumentError(
-            f"a card for {module.title} needs `end`, the end of the run, or a `run`"
-        )
+        raise ArgumentError(_NEEDS_END.format(module.title))
     return cards.replace_in(Printing(), parse_id_ranges("--part", request.part))

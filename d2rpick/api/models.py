@@ -115,7 +115,23 @@ class Motion:
             raise ArgumentError("give --tr and --td together")
         if self.tr is not None and self.td is not None:
             _check_windows((self.tr,), (self.td,), self.t_end)
-        _check_interval(self.dt, self.t_end, MOST_REPLAYED)
+        _check_interval(self.dt, self.t_end)
+        if self.t_end / self.dt > MOST_REPLAYED:
+            raise ArgumentError(
+                f"--t-end {self.t_end:g} holds more than {MOST_REPLAYED} intervals of --dt {self.dt:g}"
+            )
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """A note on a release that lies after the end of the result."""
+        if self.td is None or self.td <= self.t_end:
+            return ()
+        return (
+            (
+                f"--td {self.td:g} lies after --t-end {self.t_end:g}, so the result ends before the release; "
+                "give a later --t-end"
+            ),
+        )
 
     @property
     def start(self) -> State:
@@ -230,10 +246,12 @@ class Box:
         else:
             _check_windows(self.tr, self.td, self.end)
         if self.tilt is not None and self.drop is None:
+            raise ArgumentError("--tilt needs --drop: it is the tilt of a falling box")
+        _check_interval(self.dt, self.end)
+        if self.end / self.dt > MOST_STATES:
             raise ArgumentError(
-                "--tilt belongs to --drop; the floor of the sled keeps its own"
+                f"--t-end {self.end:g} holds more than {MOST_STATES} intervals of --dt {self.dt:g}"
             )
-        _check_interval(self.dt, self.end, MOST_STATES)
 
     @property
     def end(self) -> float:
@@ -275,15 +293,11 @@ class Box:
         return simulate(self.parameters, self.end, *rigid, interval=self.dt)
 
 
-def _check_interval(interval: float, t_end: float, most: int) -> None:
-    """Raise ArgumentError unless a run holds at least one output interval [time], and no more than ``most``."""
-    if interval > t_end:
+def _check_interval(dt: float, t_end: float) -> None:
+    """Raise ArgumentError if the output interval is longer than the run, which would give a single state."""
+    if dt > t_end:
         raise ArgumentError(
-            f"--dt {interval:g} is longer than the run, --t-end {t_end:g}; give a shorter interval"
-        )
-    if t_end / interval > most:
-        raise ArgumentError(
-            f"--t-end {t_end:g} holds more than {most} intervals of --dt {interval:g}"
+            f"--dt {dt:g} is longer than the run, --t-end {t_end:g}; give a shorter --dt"
         )
 
 
@@ -351,7 +365,7 @@ def warn_if_unbalanced(record: Record) -> tuple[Caution, ...]:
     imbalance = float(abs(record.imbalance).max())
     if imbalance <= BALANCED:
         return ()
-    message = f"the energy is balanced within {imbalance:.2g} of the largest total, {BALANCED} was expected"
+    message = f"the energy is balanced within {imbalance:.2g} of the largest total, but {BALANCED} was expected"
     return (
         Caution(
             "energy-balance",

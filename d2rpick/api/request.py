@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any, Final
 
-from d2rpick.base.errors import ArgumentError
+from d2rpick.base.errors import ArgumentError, list_names
 from d2rpick.base.options import (
     NOT_NEGATIVE,
     POSITIVE,
@@ -195,14 +195,19 @@ class Request(ChoiceOptions, ReadingOptions):
             for name in (*names, "frame_mass", "beta")
             if getattr(self, name) is not None
         ]
+        ratio_problem = []
+        if (self.frame_mass is None) == (self.beta is None):
+            ratio_problem = ["needs either `frame_mass` or `beta`, not both"]
         if given_names and (
             missing := [name for name in names if getattr(self, name) is None]
         ):
+            wanted = [f"`{name}`" for name in missing]
+            needs = [f"needs {list_names(wanted)} too", *ratio_problem]
             raise ArgumentError(
-                f"`{given_names[0]}` needs `{missing[0]}` too: give all parameters of the oscillator"
+                f"`{given_names[0]}` {', and '.join(needs)}: give all parameters of the oscillator"
             )
-        if given_names and (self.frame_mass is None) == (self.beta is None):
-            raise ArgumentError("the oscillator needs either `frame_mass` or `beta`")
+        if given_names and ratio_problem:
+            raise ArgumentError(f"the oscillator {ratio_problem[0]}")
         return bool(given_names)
 
     @property
@@ -290,11 +295,9 @@ class Request(ChoiceOptions, ReadingOptions):
         )
 
     def without_history(self) -> None:
-        """Refuse options for judging windows if there is no history."""
+        """Refuse options for judging windows if there is no history; the deck of a card needs none."""
         if lost := [
-            name
-            for name in self._given()
-            if name in {*JUDGING, *CHOOSING, "deck", "no_deck"}
+            name for name in self._given() if name in {*JUDGING, *CHOOSING, "no_deck"}
         ]:
             raise ArgumentError(
                 f"`{lost[0]}` needs an energy history; give one with `history`"
@@ -331,18 +334,22 @@ def read_channels(texts: Collection[str]) -> tuple[tuple[str, str], ...]:
     """Read ``QUANTITY=NAME``; raise ArgumentError if the quantity is unknown or occurs twice."""
     from d2rpick.histories.names import QUANTITIES, suggest_name
 
+    for text in texts:
+        if not text.partition("=")[2]:
+            near = suggest_name(text.strip("= "), tuple(QUANTITIES))
+            known = f"{near or ', where QUANTITY is one of ' + ', '.join(QUANTITIES)}"
+            raise ArgumentError(
+                f"`channels` {text}: QUANTITY=NAME was expected, such as kinetic_energy=NAME, with the name of a "
+                f"column{known}"
+            )
     split = (text.partition("=") for text in texts)
     pairs = [(quantity.strip().replace("-", "_"), name) for quantity, _, name in split]
     for quantity, name in pairs:
-        if quantity not in QUANTITIES and name:
+        if quantity not in QUANTITIES:
             near = suggest_name(quantity, tuple(QUANTITIES))
-            known = near or f", one of {', '.join(QUANTITIES)} was expected"
+            known = near or f", but one of {', '.join(QUANTITIES)} was expected"
             raise ArgumentError(
                 f"`channels` {quantity}={name}: unknown quantity {quantity!r}{known}"
-            )
-        if not name:
-            raise ArgumentError(
-                f"`channels` {quantity}={name}: QUANTITY=NAME was expected, with one of {', '.join(QUANTITIES)}"
             )
     if len({quantity for quantity, _ in pairs}) < len(pairs):
         raise ArgumentError("`channels` names a quantity twice; name each once")

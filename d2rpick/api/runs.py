@@ -291,7 +291,7 @@ def from_frame(
     from d2rpick.histories.source import Source
 
     if name is not None and not isinstance(name, str):
-        raise TypeError(f"name is {name!r}, a text was expected")
+        raise TypeError(f"name is {name!r}, but a text was expected")
     table = convert_to_frame(frame)
     chosen = make_selection(time, energy, channels)
     is_named = not is_plain_array(frame)
@@ -337,7 +337,7 @@ def _read_into_memory(file: Any) -> Source:
     data = file.read()
     if not isinstance(data, bytes):
         raise TypeError(
-            "source is a file opened as text, one opened as binary was expected: open(name, 'rb')"
+            "source is a file opened as text, but a file opened as binary was expected: open(name, 'rb')"
         )
     return Source(str(getattr(file, "name", "file")), data)
 
@@ -358,10 +358,10 @@ def check_format(input_format: str | None) -> str:
     if input_format is None:
         return "auto"
     if not isinstance(input_format, str):
-        raise TypeError(f"input_format is {input_format!r}, a text was expected")
+        raise TypeError(f"input_format is {input_format!r}, but a text was expected")
     if input_format not in ("auto", *READERS):
         raise ValueError(
-            f"input_format is {input_format!r}, one of auto, {', '.join(READERS)} was expected"
+            f"input_format is {input_format!r}, but one of auto, {', '.join(READERS)} was expected"
         )
     return input_format
 
@@ -383,7 +383,7 @@ def make_selection(
     listed: list[Any] = ([] if energy is None else [energy]) if single else list(energy)  # type: ignore[arg-type]  # a single energy is not iterated
     if channels is not None and not isinstance(channels, Mapping):
         raise TypeError(
-            f"channels is {channels!r}, a mapping of quantities to columns was expected"
+            f"channels is {channels!r}, but a mapping of quantities to columns was expected"
         )
     channel_names = dict(channels or {})
     for name, value in [
@@ -397,11 +397,11 @@ def make_selection(
             and not arguments.is_whole_number(value)
         ):
             raise TypeError(
-                f"{name} is {value!r}, the name or number of a column was expected"
+                f"{name} is {value!r}, but the name or number of a column was expected"
             )
     if unknown := [name for name in channel_names if name not in QUANTITIES]:
         raise ValueError(
-            f"channels names {unknown[0]!r}, one of {', '.join(QUANTITIES)} was expected"
+            f"channels names {unknown[0]!r}, but one of {', '.join(QUANTITIES)} was expected"
         )
     return Selection(
         time=None if time is None else str(time),
@@ -445,8 +445,8 @@ def extract_columns(
         table |= dict(zip(names, energies_not_chosen.values.T, strict=True))
         others = list_names([part.name for part in not_chosen])
         note = (
-            f"internal_energy is that of the chosen parts; momentum and mass include {others}, not chosen but flying "
-            f"with them, with the energy in {list_names(names)}"
+            f"internal_energy is the energy of the chosen parts; momentum and mass also include {others} "
+            f"({'which flies' if len(names) == 1 else 'which fly'} with them; energy in {list_names(names)})"
         )
         notes = (*notes, note)
     return (

@@ -88,6 +88,6 @@ def convert_to_frame(table: Any) -> pd.DataFrame:
     if kind:
         description = f"frame is an array of shape {table.shape}"
     raise TypeError(
-        f"{description}, a table was expected: of pandas, polars, pyarrow or xarray, an array of rows and columns, "
+        f"{description}, but a table was expected: of pandas, polars, pyarrow or xarray, an array of rows and columns, "
         "or a mapping of columns"
     )

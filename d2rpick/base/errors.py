@@ -19,6 +19,14 @@ _MOST_NAMED: Final = 20  # Largest number of names that one message lists.
 # Code of the warning that a bug in the program caused an input to be skipped.
 INTERNAL_ERROR: Final = "internal-error"
 
+# Advice for a file that is not of the format that was asked for.
+CHOOSE_FORMAT: Final = (
+    "leave `input_format` out to have the format recognised, or name another file"
+)
+
+# What a message says of a folder with the files of more than one run.
+SEVERAL_RUNS: Final = "several runs"
+
 # Advice for a file that ends within a state.
 COPY_AGAIN: Final = "copy the file again, or let the run finish"
 

@@ -67,7 +67,7 @@ def bound(name: str) -> float:
         value = 0.0
     if not value > 0:
         raise D2RPickError(
-            f"{variable} is {text!r}, a number above 0 was expected; correct it or leave it out"
+            f"{variable} is {text!r}, but a number above 0 was expected; correct it or leave it out"
         )
     return value
 

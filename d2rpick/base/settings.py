@@ -65,7 +65,7 @@ def find_nearest_settings(folder: str) -> NearestSettings:
                 return NearestSettings(table, source, tuple(notes))
             if table is not None:
                 raise ConfigurationError(
-                    f"{source}: the configuration is {format_toml_value(table)}, a table was expected"
+                    f"{source}: the configuration is {format_toml_value(table)}, but a table was expected"
                 )
     return NearestSettings({}, "", tuple(notes))
 
@@ -161,7 +161,7 @@ def refuse_unknown_settings(
             named_table = f" {table}:" if table else ""
             unknown = f"unknown key {format_toml_value(name)}{hint}"
             raise ConfigurationError(
-                f"{place}:{named_table} {unknown}, one of {names_of_keys} was expected; "
+                f"{place}:{named_table} {unknown}, but one of {names_of_keys} was expected; "
                 "--show-settings lists those of a command"
             )
 
@@ -190,7 +190,7 @@ def _explain_toml_error(path: str, error: Exception) -> str:
     cure = ""
     if re.search(r"=\s*\d+,\d+\s*(#|$)", line):
         cure = "; write the number with a decimal point"
-    reason = f"{format_toml_value(line)} was found, valid TOML was expected"
+    reason = f"{format_toml_value(line)} was found, but valid TOML was expected"
     return (
         f"{path}:{place[1]}:{place[2]}: {reason} ({str(error)[: place.start()]}){cure}"
     )

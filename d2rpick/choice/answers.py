@@ -248,6 +248,7 @@ def verify_in_history(
         If a time lies outside the record, or tr is not before td.
     """
     _check_order(tr, td)
+    history.check_pair(tr, td)
     if earlier and td == earlier.td:
         return verify_at(earlier, tr)
     situation = examine_td(history, td, settings)
@@ -719,6 +720,8 @@ def _explain_why_none(situation: Situation, ranked: Candidates) -> str:
         )
     if not (situation.history.parts or situation.history.energy.any()):
         return "the energy is 0 in all states, so nothing deforms; choose the internal energy with `energy`"
+    if situation.td <= situation.history.start:
+        return f"td = {situation.td:.6g} is the start of the record, so no time before it can be tr; give a later td"
     if not ranked:
         level = situation.energy_td
         return (

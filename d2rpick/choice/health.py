@@ -381,7 +381,7 @@ def list_flaws(history: History) -> Iterator[Caution]:
     if highest > LARGEST_ENERGY:
         yield Caution(
             "energy-too-large",
-            f"energies up to {highest:g}, at most {LARGEST_ENERGY:g} was expected; write them in a larger unit",
+            f"energies up to {highest:g}, but at most {LARGEST_ENERGY:g} was expected; write them in a larger unit",
         )
         return
     reason = _describe_divergence(history)

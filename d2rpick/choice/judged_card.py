@@ -170,7 +170,7 @@ def _describe_verdict(verdict: PairVerdict, which: str) -> Iterator[str]:
     decision = verdict.decision
     word = decision.verdict
     verdict_text = word.upper() if word == DO_NOT_USE else word
-    judged = f"Judged by {', '.join(history.source)}, {history.channel}"
+    judged = f"Verdict according to {', '.join(history.source)} ({history.channel})"
     yield f"{judged}:{which} {verdict_text}. {_format_as_sentence(decision.reason)}"
     if decision.cure:
         yield f"To improve: {decision.cure}."

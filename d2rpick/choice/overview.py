@@ -136,7 +136,7 @@ class Overview(NamedTuple):
             return "; ".join(caution.message for caution in self.unjudged)
         if not self.flights and self.states is not None and self.states < FEWEST_STATES:
             states = f"{self.states} state{'s' * (self.states != 1)}"
-            return f"the files contain {states}, at least {FEWEST_STATES} were expected"
+            return f"the files contain {states}, but at least {FEWEST_STATES} were expected"
         if not self.flights and not self.complete:
             return "the files end within a state, and no free flight is found in the part that was read"
         if not self.flights:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import importlib
 import os
+import re
 import sys
 from inspect import cleandoc
 from typing import TYPE_CHECKING, Any, Final, NoReturn, TypeVar
@@ -62,6 +63,8 @@ _LIBRARIES: Final = ("click", "numpy", "scipy", "pandas", "h5py", "matplotlib")
 _TIMES: Final = ("--tr", "--td")
 # Largest difference in similarity between the best match for a mistyped option and others that are suggested [-].
 _LESS_ALIKE: Final = 0.1
+# Message of click on arguments that a command does not take.
+_UNEXPECTED: Final = r"Got unexpected extra arguments? \((.*)\)"
 _VERSIONS: Final = "Show the versions of d2rpick and of its libraries, and exit."
 
 
@@ -202,6 +205,8 @@ def _format_usage_error(error: click.UsageError) -> str:
     """Return the message of a usage error; for an unknown option, it suggests the options that resemble it most."""
     if isinstance(error, click.BadOptionUsage) and "requires an argument" in str(error):
         return _ask_for_value(error)
+    if unexpected := re.fullmatch(_UNEXPECTED, error.message):
+        return _place_unexpected(error, unexpected[1])
     if not isinstance(error, click.NoSuchOption):
         return error.format_message()
     problem = error.message.rstrip(".")
@@ -211,8 +216,15 @@ def _format_usage_error(error: click.UsageError) -> str:
         for parameter in error.ctx.command.params
     ):
         return f"{problem}. Give the {word} by its name alone, without an option"
+    if error.ctx and isinstance(error.ctx.command, click.Group):
+        return f"{problem} before the command; give the options of a command after its name"
+    same = error.option_name.lower()
+    if error.ctx and any(same in option.opts for option in error.ctx.command.params):
+        return f"{problem}. Did you mean {same!r}?"
     if not error.possibilities:
         return error.format_message()
+    if error.ctx and error.ctx.command.name == "plan" and error.option_name == "--td":
+        return f"{problem}. d2rpick plan chooses td itself; d2rpick suggest chooses tr for a given td"
     if error.ctx and error.ctx.command.name == "check" and error.option_name in _TIMES:
         return f"{problem}. The times are those of the deck; d2rpick verify judges other times"
     if error.option_name == "--tr":
@@ -230,6 +242,30 @@ def _format_usage_error(error: click.UsageError) -> str:
     nearest = [name for name in likeness if likeness[name] >= best - _LESS_ALIKE]
     names = " or ".join(map(repr, sorted(nearest, key=lambda name: -likeness[name])))
     return f"{problem}. Did you mean {names}?"
+
+
+def _place_unexpected(error: click.UsageError, words: str) -> str:
+    """Return the message on words that a command does not take, with the place where it takes a file."""
+    if error.ctx is None:
+        return error.format_message()
+    command = error.ctx.command
+    names = [option.name for option in command.params if option.name != "help"]
+    taken = [
+        parameter.make_metavar(error.ctx)
+        for parameter in command.params
+        if isinstance(parameter, click.Argument)
+    ]
+    if taken:
+        problem = f"{words}: unexpected, because d2rpick {command.name} takes one {' '.join(taken)}"
+    else:
+        problem = (
+            f"{words}: unexpected, because d2rpick {command.name} takes options only"
+        )
+    if "history" in names:
+        return f"{problem}; give a history as --history {words}"
+    if "RUN" in taken:
+        return f"{problem}; if these are files of one run, give their folder"
+    return f"{problem}; leave it out, or put quotes around a name with spaces"
 
 
 def _list_commands_with_option(error: click.NoSuchOption) -> list[str]:

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 )
 @options.add_options(
     *("part", *CARDS, "deck", "no_deck", *REFERENCE, *FILES, "exit_zero"),
-    deck="Main deck that belongs to --history; it defines which parts become one rigid body.",
+    deck="Main deck of the run, which defines the parts that become one rigid body; it is checked with the card.",
     part={
         "help": "Parts to switch: number (3,7) or range (10-19); with --history also title, "
         '"flying", "all" or, with --deck too, "recommended".',
@@ -57,7 +57,7 @@ def card(
     """Print solver input for switching windows, ready to be pasted.
 
     With a history, d2rpick judges the times as printed, and adds the verdict as a comment.  With the deck of the run,
-    it merges parts that share nodes, and checks the deck with the card in it.
+    it merges parts that share nodes, and checks the deck with the card in it.  The deck needs no history.
 
     Examples
     --------
@@ -74,7 +74,7 @@ def card(
     times = _read_windows(tr, td, windows)
     run = options.open_judging_run(request)
     output = output.beside(windows, *(run.sources if run else ()))
-    judged_card = print_card(times, run, request, cards)
+    judged_card = print_card(times, run, request, cards, windows or "")
     question = request.repeat()
     if judged_card.verdicts:
         history = judged_card.verdicts[0].situation.history
@@ -99,7 +99,7 @@ def _read_windows(
         return options.read_windows_in(file)
     if len(tr) != len(td):
         raise click.UsageError(
-            f"{len(tr)} --tr and {len(td)} --td were given, a --td for each --tr was expected"
+            f"{len(tr)} --tr and {len(td)} --td were given, but a --td for each --tr was expected"
         )
     return list(zip(tr, td, strict=True))
 

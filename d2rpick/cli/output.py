@@ -43,6 +43,8 @@ _NARROWEST: Final = 40
 _NAMED: Final = {".json": "json", ".ndjson": "ndjson", ".csv": "csv", ".md": "markdown"}
 # Suffixes of unsupported files that users may expect for a report.
 _PRINTED: Final = (".pdf", ".doc", ".docx")
+# Suffixes of a report.
+_PAGES: Final = (".html", ".htm", ".xhtml")
 # Pattern of the result lines that are printed in bold: recommendations, verdicts, and findings of rules.
 _VERDICTS: Final = "use|use with care|do not use|no pair to use|common tr"
 _ANSWER: Final = rf"(?m)^(\* |(  )?({_VERDICTS})\b|  .*:\d+:\d+: (error|warning) D2R).*"
@@ -356,10 +358,15 @@ def _check_report(name: str | None) -> None:
     """Raise D2RPickError if the file name of a report implies a format other than HTML."""
     if name == "-":
         raise D2RPickError("-: --report writes a file; give its name")
-    if name is not None and name.lower().endswith(_PRINTED):
+    if name is None:
+        return
+    stem, suffix = os.path.splitext(name)  # noqa: PTH122  pathlib would slow down start-up
+    if suffix.lower() in _PRINTED:
         raise D2RPickError(
             f"{name}: the report is an HTML page; name it .html, and print it to PDF in a browser"
         )
+    if suffix and suffix.lower() not in _PAGES:
+        raise D2RPickError(f"{name}: the report is an HTML page; name it {stem}.html")
 
 
 def _find_implied_format(name: str) -> str | None:

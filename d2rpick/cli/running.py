@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from d2rpick.base.errors import make_printable
-from d2rpick.base.options import NOT_NEGATIVE, POSITIVE, Option
+from d2rpick.base.options import NOT_NEGATIVE, POSITIVE, UNLIMITED, Option
 from d2rpick.cli import options
 from d2rpick.cli.missing import list_needs_of_drive, list_needs_of_first
 from d2rpick.cli.output import Output, encode_text, name_options_and_wrap, tell
 from d2rpick.cli.progress import show_progress
-from d2rpick.cli.values import choose_click_type
+from d2rpick.cli.values import SECONDS, choose_click_type
 from d2rpick.report.formats import FORMATS
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ CMD = ("program", "CMD")
     ),
 )
 @click.option(
-    "--threads", type=click.IntRange(min=1), default=1, show_default=True, metavar="N",
+    "--threads", type=choose_click_type(range(1, UNLIMITED)), default=1, show_default=True, metavar="N",
     help="Threads of the solver; {threads} in a command.",
 )  # fmt: skip
 @click.option("--resume", is_flag=True, help="Resume a run that was started in RUNDIR.")
@@ -176,7 +176,7 @@ def _plan(driving: Driving) -> list[str]:
     help="Report the present state, and exit.",
 )
 @click.option(
-    "--for", "lasting", type=choose_click_type(NOT_NEGATIVE), metavar="T", cls=options.Either, instead_of=("once",),
+    "--for", "lasting", type=choose_click_type(NOT_NEGATIVE), metavar=SECONDS, cls=options.Either, instead_of=("once",),
     help="Stop watching after this number of seconds.  [default: when the run has ended]",
 )  # fmt: skip
 @options.add_options(
@@ -192,7 +192,7 @@ def follow(
     request: Request,
     output: Output,
 ) -> None:
-    """Watch RUN (files or a folder) while the solver computes it, and report when the parts fly and when to switch.
+    """Watch RUN (a file or a folder) while the solver computes it, and report when the parts fly and when to switch.
 
     d2rpick prints a line for each event: load, flight with its evidence, recommended switch, contact, restart, silence,
     end.  RUN need not have started.  d2rpick does not start, stop or change anything.

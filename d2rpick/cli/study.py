@@ -29,7 +29,7 @@ from d2rpick.cli.values import choose_click_type
 from d2rpick.report.formats import FORMATS, RepeatedQuestion
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
 
     from d2rpick.api.studies import Ledger, Study
     from d2rpick.base.workers import Farm
@@ -183,8 +183,8 @@ def _is_unmatched_pattern(name: str) -> bool:
     return any(sign in name for sign in "*?[") and not os.path.lexists(name)
 
 
-def _read_list(name: str) -> Iterator[str]:
-    """Yield the names in a list file, one per line; blank lines and comments are skipped."""
+def _read_list(name: str) -> list[str]:
+    """Return the names in a list file, one per line; blank lines and comments are skipped."""
     from pathlib import Path
 
     if name == "-" and sys.stdin is None:
@@ -202,9 +202,21 @@ def _read_list(name: str) -> Iterator[str]:
             f"{name}: holds NUL bytes; give a text file with one run per line"
         )
     # splitlines() is not used, because it also splits at characters that names may contain.
-    for text in os.fsdecode(content).removeprefix("\ufeff").split("\n"):
-        if (text := text.strip()) and not text.startswith("#"):
-            yield text
+    lines = os.fsdecode(content).removeprefix("\ufeff").split("\n")
+    names = [
+        text for line in lines if (text := line.strip()) and not text.startswith("#")
+    ]
+    if len(names) > 1 and not any(map(_may_be_run, names)):
+        raise FormatError(
+            f"{name}: none of its {len(names)} lines names a file or folder, the first is {names[0]!r}; give a file "
+            "with one run per line, or name a run without --from"
+        )
+    return names
+
+
+def _may_be_run(name: str) -> bool:
+    """Return True for a name that exists or is a pattern."""
+    return os.path.lexists(name) or any(sign in name for sign in "*?[")
 
 
 def _check_ledger(name: str | None, written: Mapping[str, str | None]) -> None:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 from click.core import ParameterSource
 
+from d2rpick.api.arguments import suggest_share
 from d2rpick.api.cards import (
     SETTINGS,
     Cards,
@@ -38,6 +39,8 @@ else:
     FloatType = click.ParamType  # This class has been generic since click 8.4.
 
 CARDS: Final = tuple(list_options(Cards))
+# Placeholder of a time that is measured by the clock, not in the unit of the run.
+SECONDS: Final = "SECONDS"
 _PAIR: Final = 2  # Number of values of an option that takes a pair.
 # Options that settings may contain for every command, but that apply only if one of the listed options is given.
 _BESIDE: Final[dict[str | None, tuple[str, ...]]] = {
@@ -64,13 +67,15 @@ class NumberType(FloatType):
         except ValueError:
             from d2rpick.api.arguments import (
                 suggest_decimal_point,
+                suggest_seconds,
                 suggest_without_percent,
                 suggest_without_unit,
             )
 
+            is_by_clock = bool(param and param.metavar == SECONDS)
             hint = (
                 suggest_decimal_point(value)
-                or suggest_without_unit(value)
+                or (suggest_seconds if is_by_clock else suggest_without_unit)(value)
                 or suggest_without_percent(
                     value, is_time=bool(param and param.metavar == "T")
                 )
@@ -78,12 +83,17 @@ class NumberType(FloatType):
             if param and param.nargs == _PAIR and not hint:
                 hint = ": two numbers were expected"
             if param and param.metavar == "T" and not hint:
-                hint = ", a time in the unit of the run was expected, such as 0.005"
+                hint = ", but a time in the unit of the run was expected, such as 0.005"
             self.fail(f"{value!r} is not a number{hint}", param, ctx)
         if not math.isfinite(number):
             self.fail(f"{value!r} is not a finite number", param, ctx)
         if limit := self.limits.missed(number):
-            self.fail(f"{value} was found, a number {limit} was expected", param, ctx)
+            hint = suggest_share(number) if self.limits.high == 1 else ""
+            self.fail(
+                f"{value} was found, but a number {limit} was expected{hint}",
+                param,
+                ctx,
+            )
         return number
 
 
@@ -103,7 +113,9 @@ class WholeNumber(click.IntRange):
         is_within = number is not None and (least or 0) <= number
         if number is None or not is_within or (most is not None and number > most):
             self.fail(
-                f"{value} was found, a whole number {limits} was expected", param, ctx
+                f"{value} was found, but a whole number {limits} was expected",
+                param,
+                ctx,
             )
         return number
 
@@ -120,7 +132,7 @@ class File(click.types.StringParamType):
         name = super().convert(value, param, ctx)
         if "\0" in name:
             self.fail(
-                f"{name!r} holds a NUL byte, the name of a file was expected",
+                f"{name!r} holds a NUL byte, but the name of a file was expected",
                 param,
                 ctx,
             )
@@ -330,7 +342,7 @@ def _list_given_settings(
     for name in COMMANDS:
         if name in shared:
             raise ConfigurationError(
-                f"{source}: {name} is {format_toml_value(shared[name])}, a table was expected"
+                f"{source}: {name} is {format_toml_value(shared[name])}, but a table was expected"
             )
     refuse_unknown_settings(shared, (*RULE_KEYS, *SETTINGS), source)
     refuse_unknown_settings(tables, (*COMMANDS, "severity"), source)
@@ -361,7 +373,7 @@ def _read_value(
     ):
         expected = "a list" if option.nargs > 1 else _name_expected_kind(option)
         raise ConfigurationError(
-            f"{position} is {format_toml_value(value)}, {expected} was expected"
+            f"{position} is {format_toml_value(value)}, but {expected} was expected"
         )
     try:
         converted = option.type_cast_value(ctx, values if has_list else value)

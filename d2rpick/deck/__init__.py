@@ -50,10 +50,10 @@ def read_inventory(path: str) -> Inventory:
         inventory = ls_dyna_inventory.read_ls_dyna_inventory(read_deck(path))
     if not inventory.parts:
         is_explained = inventory.notes and not inventory.complete
-        why = f" ({inventory.notes[0]})" if is_explained else ""
-        raise DeckError(
-            f"{path}: no parts were found{why}; give the main deck of the run"
-        )
+        why = f", because {inventory.notes[0]}" if is_explained else ""
+        packed = radioss_files.find_packed_starter(path) if is_run else ""
+        cure = f"unpack {packed}" if packed else "give the main deck of the run"
+        raise DeckError(f"{path}: no parts were found{why}; {cure}")
     return inventory
 
 

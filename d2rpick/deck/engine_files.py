@@ -54,7 +54,7 @@ def plan_legs(
             stops.append((td, rigid_cap))
     if len(stops) >= MOST_LEGS:
         raise DeckError(
-            f"{len(windows)} windows need {len(stops) + 1} engine runs, at most {MOST_LEGS} were expected"
+            f"{len(windows)} windows need {len(stops) + 1} engine runs, but at most {MOST_LEGS} were expected"
         )
     numbered = enumerate([*stops, (end, None)], start=1)
     return [EngineFile(number, stop, cap) for number, (stop, cap) in numbered]

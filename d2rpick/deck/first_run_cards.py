@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from d2rpick.base.errors import DeckError
+from d2rpick.base.errors import DeckError, RangeError
 from d2rpick.deck.engine_files import EngineFile, write_engine_lines
 from d2rpick.deck.ls_dyna_parts import read_entities
 from d2rpick.deck.printed_card import (
@@ -27,7 +27,7 @@ from d2rpick.deck.radioss_sensors import require_forces
 from d2rpick.deck.reader import read_deck
 from d2rpick.deck.sensor_cards import write_flight_sensors
 from d2rpick.deck.suiting import find_suiting
-from d2rpick.deck.switch_sets import Waiting, write_set_pair
+from d2rpick.deck.switch_sets import Waiting, write_joint_remarks, write_set_pair
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -49,9 +49,10 @@ _OF_ALL: Final = (
     "A first run: without a reference run the energy at td is unknown, so tr is not matched to it.",
     "Only contact forces are monitored: apart from gravity, nothing else may act on the parts.",
 )
+_RIGID_FROM_START: Final = "The parts fall freely from rest, so they are rigid from 0."
 _OF_RADIOSS: Final = (
     "Each deformable engine run ends when no contact has had a force for the force-free time.",
-    "No window keeps a margin: each rigid engine run ends in the first step of a contact, at most {cap:g} into it.",
+    "No window keeps a margin: each rigid engine run ends at most {cap:g} after a contact begins.",
     "A contact of the parts with each other counts too: while it has a force, they do not fly.",
     "Engine runs after the end of the run take one step.",
 )
@@ -68,7 +69,7 @@ _DELETED: Final = (
     "Constraints that all lie on these parts are deleted while the parts are rigid (NRBF or NCSF 1), and then activated"
     " again (2)."
 )
-_AT_REST: Final = "In free fall from rest: rigid from 0, TIME1 0."
+_AT_REST: Final = "The parts fall freely from rest, so they are rigid from 0 (TIME1 0)."
 _OF_LOAD: Final = "TIME1 is 0: if you know the end of the load, give it (--after)."
 _WITHOUT_OFFSET: Final = (
     "OFFSET 0: the parts become deformable in the contact; only automatic contacts of shells"
@@ -110,7 +111,7 @@ class FirstRunDeck(NamedTuple):
 
     def explain_wait(self) -> str:
         """Return the note that states how long no force must act until a flight is detected, and why."""
-        return f"force-free time that marks a flight: {self.wait:.4g}; {self.reason}"
+        return f"A flight is detected when no force has acted for {self.wait:.4g} ({self.reason})."
 
     def falls_from_rest(self, *, starts_moving: bool) -> bool:
         """Return True if gravity acts and the parts do not start moving, so that they may be rigid from the start."""
@@ -148,13 +149,14 @@ def _print_radioss_cards(first_run: FirstRunDeck) -> PrintedCard:
         count = len(run.legs)
         found = f"{count} engine files" if run.starter else "no starter deck"
         raise DeckError(
-            f"{path}: the run has {found}, a starter deck and 1 engine file were expected; give the deck of a run "
+            f"{path}: the run has {found}, but a starter deck and 1 engine file were expected; give the deck of a run "
             "without restart segments, in a folder of its own"
         )
     for load in run.starter.named(*_LOADS):
         raise DeckError(f"{load.at}: /{load.name} {_UNSEEN}")
     contacts = require_forces(path, run.starter)
     (leg,) = run.legs
+    _check_wait_against_end(path, wait, leg.stop.value)
     starts_moving = bool(run.starter.named("INIVEL") or leg.starts)
     at_rest = first_run.falls_from_rest(starts_moving=starts_moving)
     first_switch = max(first_run.after or 0.0, wait)
@@ -174,15 +176,24 @@ def _print_radioss_cards(first_run: FirstRunDeck) -> PrintedCard:
         if number < _MOST_LEGS - at_rest:
             lines += ["/STOP/LSENSOR", str(contact if rigid else flight), "0 0 0 0 0 0"]
         files[f"{leg.name}_{number:04d}.rad"] = "\n".join(lines) + "\n"
-    explanation = first_run.explain_wait()
-    if at_rest:
-        explanation = f"in free fall from rest: rigid from 0; then {explanation}"
     of_radioss = [note.format(cap=largest_step) for note in _OF_RADIOSS]
-    notes = [explanation, *bodies.notes, *_OF_ALL, *of_radioss]
+    notes = [first_run.explain_wait(), *bodies.notes, *_OF_ALL, *of_radioss]
+    if at_rest:
+        notes.insert(0, _RIGID_FROM_START)
     if run.starter.named("RWALL"):
         notes.append(_OF_WALLS)
     head = "".join(f"# {line}\n" for line in write_comments([*notes, *PHYSICS]))
     return PrintedCard(head, (), files, tuple(notes), bodies.cards + sensors)
+
+
+def _check_wait_against_end(path: str, wait: float, end: float) -> None:
+    """Raise RangeError if the run ends before the force-free time has passed, so that no flight can be detected."""
+    if wait < end:
+        return
+    raise RangeError(
+        f"{path}: `wait` {wait:g} is not shorter than the run, which ends at {end:g}; give a shorter time, in the unit "
+        "of the deck"
+    )
 
 
 # The functions below write the cards for LS-DYNA.
@@ -194,18 +205,22 @@ def _print_ls_dyna_cards(first_run: FirstRunDeck) -> PrintedCard:
     deck = read_deck(path)
     contact, keyword = _find_contact(path, deck)
     part_ids = check_ids(first_run.parts)
-    suiting = find_suiting(path, part_ids)
+    bodies = first_run.inventory.bodies(part_ids)
+    suiting = find_suiting(path, part_ids, bodies)
     printing = Printing(
         part=tuple(part_ids),
-        bodies=first_run.inventory.bodies(part_ids),
+        bodies=bodies,
         swset=suiting.swset or Printing().swset,
         delete_nodal_bodies=suiting.delete_nodal_bodies,
         delete_node_sets=suiting.delete_node_sets,
+        parting=suiting.parting,
+        kept_joints=suiting.kept_joints,
     )
     offset, offset_note = _choose_offset(first_run.inventory, keyword)
     notes = [first_run.explain_wait(), *_OF_ALL, *_OF_LS_DYNA, offset_note]
     if suiting.delete_nodal_bodies or suiting.delete_node_sets:
         notes.append(_DELETED)
+    notes += write_joint_remarks(printing)
     if after is None:
         starts_moving = bool(deck.named("INITIAL_VELOCITY"))
         at_rest = first_run.falls_from_rest(starts_moving=starts_moving)

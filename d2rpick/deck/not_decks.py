@@ -27,7 +27,7 @@ _TEXT: Final = (
 )
 # The option `run` names a history on the command line and in Python.
 _CURE: Final = (
-    "a deck was expected; give the main deck of the run, and this file as `run`"
+    "but a deck was expected; give the main deck of the run, and this file as `run`"
 )
 
 

@@ -72,6 +72,8 @@ class Printing(NamedTuple):
     delete_nodal_bodies, delete_node_sets : bool
         For LS-DYNA, delete nodal rigid bodies and generalized welds (NRBF), or other constraints (NCSF), while the
         parts are rigid.
+    parting, kept_joints : tuple of str
+        For LS-DYNA, the deleted constraints and the active joints that connect separate rigid bodies, as text.
     replaced : tuple of int
         Main nodes of the bodies that new bodies replace.
     """
@@ -90,6 +92,8 @@ class Printing(NamedTuple):
     sensor: int = 901
     delete_nodal_bodies: bool = False
     delete_node_sets: bool = False
+    parting: tuple[str, ...] = ()
+    kept_joints: tuple[str, ...] = ()
     contact: int | None = None
     wall: int | None = None
     pushed: tuple[Times, ...] = ()
@@ -191,9 +195,13 @@ def refuse_overlapping_windows(windows: Sequence[Times]) -> tuple[Times, ...]:
     for tr, td in windows:
         if tr == td:
             raise DeckError(f"tr and td are both {tr:g}; give a td after tr")
-        if not 0 <= tr < td < math.inf:
+        if tr < 0:
             raise DeckError(
-                f"tr is {tr:g} and td is {td:g}, 0 <= tr < td was expected; give the earlier time as tr"
+                f"tr = {tr:g} lies before the start of the run; give a tr from 0"
+            )
+        if not tr < td < math.inf:
+            raise DeckError(
+                f"tr is {tr:g} and td is {td:g}, but tr < td was expected; give the earlier time as tr"
             )
     for (tr, td), (later, end) in pairwise(windows):
         if not later > td:

@@ -13,7 +13,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base import __version__
-from d2rpick.base.errors import DeckError
+from d2rpick.base.errors import DeckError, name_units
 from d2rpick.deck import printed_card
 from d2rpick.deck.engine_files import (
     CAP_SHARE,
@@ -39,6 +39,7 @@ from d2rpick.deck.radioss_columns import (
 from d2rpick.deck.switch_sets import (
     Waiting,
     group_by_lead,
+    write_joint_remarks,
     write_set_pair,
 )
 
@@ -141,7 +142,10 @@ def _print_ls_dyna(
         lines += _write_window(pair, numbers, ids, printing, part_sets)
     text = "\n".join(lines) + "\n"
     return PrintedCard(
-        text, tuple((float(tr), float(td)) for tr, td in texts), {_FILE: text}, notes
+        text,
+        tuple((float(tr), float(td)) for tr, td in texts),
+        {_FILE: text},
+        (*notes, *_note_other_lead(ids, printing.merge)),
     )
 
 
@@ -238,6 +242,18 @@ def _note_roundings(times: Times, texts: tuple[str, str]) -> Iterator[str]:
             yield f"{name} = {value:.6g} is rounded to {text}, the nearest number in {LONGEST} characters."
 
 
+def _note_other_lead(ids: Sequence[int], lead: int | None) -> tuple[str, ...]:
+    """Return a note if the lead part is none of the switched parts, so that no card makes it rigid."""
+    if lead is None or lead in ids:
+        return ()
+    return (
+        (
+            f"the lead part {lead} of `merge` is not among the switched {name_units(ids)}: it must be rigid in the "
+            f"deck already; otherwise give one of the switched parts, such as {ids[0]}"
+        ),
+    )
+
+
 def _write_warnings(ids: Sequence[int], printing: Printing) -> Iterator[str]:
     """Yield the comment lines of an LS-DYNA card."""
     deleted = (
@@ -245,6 +261,7 @@ def _write_warnings(ids: Sequence[int], printing: Printing) -> Iterator[str]:
         *(_NODE_SETS_DELETED if printing.delete_node_sets else ()),
     )
     yield from (
+        *write_comments([*write_joint_remarks(printing)]),
         *PHYSICS,
         *(deleted or _LEFT_ACTIVE),
         "Springs and dampers are not switched.",
@@ -470,7 +487,9 @@ def _check_run(
             problem = "the end of the run is not given"
         else:
             problem = f"the run ends at {printing.end:g}"
-        raise DeckError(f"{problem}, expected a time after td = {windows[-1][1]:g}")
+        raise DeckError(
+            f"{problem}, but a time after td = {windows[-1][1]:g} was expected; give it as `end`"
+        )
     return windows, ids, printing.end
 
 

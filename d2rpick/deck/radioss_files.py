@@ -53,6 +53,13 @@ def is_radioss(head: bytes) -> bool:
     )
 
 
+def find_packed_starter(path: str) -> str:
+    """Return the packed starter deck beside an engine file NAME_0001.rad; empty if there is none."""
+    numbered = re.fullmatch(_NUMBERED, path)
+    packed = f"{numbered[1]}_0000.rad.gz" if numbered else ""
+    return packed if packed and os.path.isfile(packed) else ""  # noqa: PTH113  pathlib would slow down start-up
+
+
 def list_run_files(path: str) -> list[str]:
     """Return the files of the run to which ``path`` belongs; empty if it is not a file of a Radioss run.
 

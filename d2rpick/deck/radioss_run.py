@@ -130,7 +130,7 @@ def read_run(path: str, content: bytes | None = None) -> RadiossRun:
                 refuse_text_history(name, head)
             cure = "; for LS-DYNA see d2rpick first" if is_ls_dyna else ""
             raise DeckError(
-                f"{name}: {found}, a file of a Radioss run was expected{cure}"
+                f"{name}: {found}, but a file of a Radioss run was expected{cure}"
             )
         run.deck.sources.append(source)
         if re.search(ENGINE, head):

@@ -8,6 +8,7 @@ whose mapped page disappears.
 
 from __future__ import annotations
 
+import os
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Final
 
@@ -28,6 +29,8 @@ HELD_UP_TO: Final = 1 << 18
 _WINDOW: Final = 1 << 16
 # Number of blocks of a file that are cached, because the ends of large blocks are read repeatedly.
 _KEPT: Final = 8
+# Endings of the names of main decks; engine files of Radioss have other numbers.
+_DECKS: Final = (".k", ".key", ".dyn", "_0000.rad")
 
 
 class HeldInMemory:
@@ -128,6 +131,16 @@ def open_stored(name: str) -> HeldInMemory | DeckOnDisk:
     )
 
 
+def _name_deck_in(folder: str) -> str:
+    """Return the name of the only main deck in a folder, as an example; empty if there is none or more than one."""
+    decks = [
+        name
+        for name in os.listdir(folder)  # noqa: PTH208  pathlib would slow down start-up
+        if name.lower().endswith(_DECKS)
+    ]
+    return f", {os.path.join(folder, decks[0])}" if len(decks) == 1 else ""  # noqa: PTH118  as above
+
+
 def _open_file(name: str) -> FileIO:
     """Open a file; raise DeckError if that fails."""
     try:
@@ -138,7 +151,7 @@ def _open_file(name: str) -> FileIO:
         ) from None
     except IsADirectoryError:
         raise DeckError(
-            f"{name}: cannot be read (this is a folder); check the name, and give the main deck in it"
+            f"{name}: this is a folder; give the main deck in it{_name_deck_in(name)}"
         ) from None
     except (OSError, ValueError) as error:
         # ValueError is raised for a NUL byte in the name.

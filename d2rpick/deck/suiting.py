@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from d2rpick.base.errors import DeckError
+from d2rpick.base.errors import DeckError, name_units
 from d2rpick.deck.ls_dyna_parts import (
     DELETING_FLAGS,
     Constraint,
@@ -18,7 +18,9 @@ from d2rpick.deck.reader import Deck, read_deck
 from d2rpick.deck.switching import read_switching
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Sequence
+    from collections.abc import Collection, Iterator, Sequence
+
+    from d2rpick.deck.ls_dyna_parts import Kind
 
 # First id of new switch sets and part sets, unless the deck already uses it.
 _FIRST: Final = 901
@@ -30,7 +32,8 @@ class Suiting(NamedTuple):
     ``solver`` is the solver of the deck; ``name`` and ``end`` [time] are those of its run. ``swset`` contains free ids
     of switch sets; the ids above them are free for part sets, too. ``delete_nodal_bodies`` and ``delete_node_sets`` are
     True if the deck has such constraints, and only on these parts, so that they have to be deleted while the parts are
-    rigid.
+    rigid. ``parting`` describes deleted constraints that connect separate rigid bodies, and ``kept_joints`` the joints
+    between separate rigid bodies that stay active.
     """
 
     solver: str
@@ -39,10 +42,16 @@ class Suiting(NamedTuple):
     swset: tuple[int, int] | None = None
     delete_nodal_bodies: bool = False
     delete_node_sets: bool = False
+    parting: tuple[str, ...] = ()
+    kept_joints: tuple[str, ...] = ()
 
 
-def find_suiting(path: str, parts: Collection[int]) -> Suiting:
+def find_suiting(
+    path: str, parts: Collection[int], bodies: Sequence[Collection[int]] = ()
+) -> Suiting:
     """Return what a deck requires of a card that switches the given parts.
+
+    ``bodies`` contains the parts of each rigid body; any other part becomes a body of its own.
 
     Raises
     ------
@@ -57,11 +66,75 @@ def find_suiting(path: str, parts: Collection[int]) -> Suiting:
             "radioss", find_name_of_files(run), legs[-1].stop.value if has_end else None
         )
     deck = read_deck(path)
+    suiting = Suiting("ls-dyna", swset=_find_free_ids(deck))
+    return _choose_deletions(suiting, deck, parts, bodies)
+
+
+def _choose_deletions(
+    suiting: Suiting,
+    deck: Deck,
+    parts: Collection[int],
+    bodies: Sequence[Collection[int]],
+) -> Suiting:
+    """Add the constraints to be deleted while the parts are rigid.
+
+    A flag of a card deletes all constraints of its kinds. Joints between rigid bodies are valid in LS-DYNA, so they
+    stay active unless the same flag has to delete other constraints.
+    """
+    by_flag = {flag: _read_deleted(deck, flag) for flag in ("NRBF", "NCSF")}
     nodal, by_set = (
-        _is_on_parts(_read_deleted(deck, flag), parts, deck)
-        for flag in ("NRBF", "NCSF")
+        _is_on_parts(constraints, parts, deck) for constraints in by_flag.values()
     )
-    return Suiting("ls-dyna", None, None, _find_free_ids(deck), nodal, by_set)
+    parting_by_flag = {
+        flag: [*_find_parting(constraints, parts, bodies, deck)]
+        for flag, constraints in by_flag.items()
+    }
+    kept: list[str] = []
+    are_joints = all(constraint.kind == "joint" for constraint in by_flag["NCSF"])
+    if by_set and are_joints and parting_by_flag["NCSF"]:
+        by_set = False
+        kept = [text for _, text in parting_by_flag["NCSF"]]
+    # NRBF may delete joints and extra nodes too.
+    parting = [
+        text
+        for found in parting_by_flag.values()
+        for kind, text in found
+        if (nodal and "NRBF" in DELETING_FLAGS[kind])
+        or (by_set and "NCSF" in DELETING_FLAGS[kind])
+    ]
+    return suiting._replace(
+        delete_nodal_bodies=nodal,
+        delete_node_sets=by_set,
+        parting=tuple(parting),
+        kept_joints=() if parting else tuple(kept),
+    )
+
+
+def _find_parting(
+    constraints: Sequence[Constraint],
+    parts: Collection[int],
+    bodies: Sequence[Collection[int]],
+    deck: Deck,
+) -> Iterator[tuple[Kind, str]]:
+    """Yield the constraints that connect separate rigid bodies of ``parts``, each with its kind and a description."""
+    if not constraints:
+        return
+    # Imported here to keep start-up fast.
+    from d2rpick.deck.ls_dyna_inventory import find_parts_of_nodes
+
+    nodes = frozenset[int]().union(*(item.nodes for item in constraints))
+    cards = find_element_cards(deck, searched=True)
+    parts_by_node = find_parts_of_nodes(cards, nodes)
+    lead_by_part = {part: min(body) for body in bodies for part in body}
+    for constraint in constraints:
+        linked = frozenset[int]().union(
+            *(parts_by_node.get(node, ()) for node in constraint.nodes)
+        )
+        linked |= {constraint.part} if constraint.part else set()
+        rigid = linked & {*parts}
+        if len({lead_by_part.get(part, part) for part in rigid}) > 1:
+            name = f"{constraint.kind} {constraint.id}".removesuffix(" 0")
+            yield constraint.kind, f"{name} of {name_units(rigid)}"
 
 
 def find_name_of_files(run: RadiossRun) -> str | None:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
+from d2rpick.base.errors import list_names
 from d2rpick.deck.ls_dyna_columns import (
     SWITCH_COUNTS,
     SWITCH_TIMES,
@@ -20,6 +21,19 @@ if TYPE_CHECKING:
 
 # Values of NRBF and NCSF that delete the constraints on the parts and activate them again.
 _DELETE, _ACTIVATE = 1, 2
+# Remarks on constraints between separate rigid bodies.
+_PARTING: Final = (
+    "CHECK BEFORE USE: parts may separate while they are rigid, because the cards delete (NRBF or NCSF 1) what connects"
+    " separate rigid bodies"
+)
+_MERGE_THEM: Final = (
+    "Merge these parts (d2rpick card --merge), or keep them deformable."
+)
+_KEPT_JOINTS: Final = "Joints between separate rigid bodies stay active (NCSF 0)"
+_OF_JOINTS: Final = (
+    "They are valid between rigid bodies. This was not tested with the solver: check the motion in "
+    "the animation."
+)
 
 
 def write_rigid_lines(
@@ -114,6 +128,14 @@ def write_header(
         R2D=counts[1],
         OFFSET=write_number(waiting.offset),
     )
+
+
+def write_joint_remarks(printing: Printing) -> Iterator[str]:
+    """Yield the remarks about constraints between separate rigid bodies."""
+    if printing.parting:
+        yield f"{_PARTING}: {list_names(printing.parting)}. {_MERGE_THEM}"
+    if printing.kept_joints:
+        yield f"{_KEPT_JOINTS}: {list_names(printing.kept_joints)}. {_OF_JOINTS}"
 
 
 def write_set_pair(

@@ -337,7 +337,7 @@ def _read_part_line(card: Card, row: Row, *, to_rigid: bool, ptype: bool) -> _Li
         kind = Value(
             "PART",
             kind.field,
-            f"PTYPE is {kind.field.text!r}, PART or PSET was expected",
+            f"PTYPE is {kind.field.text!r}, but PART or PSET was expected",
         )
     by_set = kind.value == "PSET"
     part = _add_offset(

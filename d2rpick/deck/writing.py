@@ -120,8 +120,12 @@ def write_deck(
             (target / name).parent.mkdir(parents=True, exist_ok=True)
             write_as_a_whole(target / name, content)
     except OSError as error:
+        if os.path.isfile(folder):  # noqa: PTH113  pathlib would slow down start-up
+            reason = "this is a file, but a folder was expected"
+        else:
+            reason = f"cannot be written ({error.strerror})"
         raise DeckError(
-            f"{error.filename or folder}: cannot be written ({error.strerror}); choose another folder"
+            f"{error.filename or folder}: {reason}; choose another folder"
         ) from None
     return [str(target / name) for name in files]
 
@@ -147,14 +151,21 @@ def _write_ls_dyna(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
     _refuse_switched(deck, printed)
     ((name, text),) = card.files.items()
     if deck.long:
-        # The suffix "-" keeps the fields of the cards 10 characters wide.
-        text = text.replace("_AUTOMATIC\n", "_AUTOMATIC-\n")
+        text = _keep_standard_format(text)
     yield (
         Path(main).name,
         insert_cards(deck.sources[0], f"*INCLUDE\n{name}\n", deck.sources[0].blocks()),
     )
     yield name, text.encode()
     yield from copy_files(deck.sources[1:], main, {name, Path(main).name})
+
+
+def _keep_standard_format(cards: str) -> str:
+    """Give each keyword the suffix ``-``: its fields are then 10 characters wide, also in a deck in long format."""
+    return "".join(
+        f"{line.rstrip()}-\n" if line.startswith("*") else line
+        for line in cards.splitlines(keepends=True)
+    )
 
 
 def _refuse_switched(deck: Deck, printed: Deck) -> None:

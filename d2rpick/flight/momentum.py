@@ -482,9 +482,15 @@ def _select_heaviest_parts(
     flights: Sequence[FreeFlight],
 ) -> tuple[Part, ...]:
     """Return the deformable parts of the flight with the largest product of mass and duration."""
-    if not flights or momenta is None:
+    if momenta is None:
         raise FormatError(
             f"{run.name}: no momenta show which parts fly together; name the switched parts with `parts`"
+        )
+    if not flights:
+        first, last = momenta.time[0], momenta.time[-1]
+        raise FormatError(
+            f"{run.name}: the momenta show no parts that fly together from {first:g} to {last:g}; continue the run "
+            "until they fly, or name the switched parts by their ids with `parts`"
         )
     if momenta.masses is None:
         masses = np.ones(len(run.parts))

@@ -385,9 +385,10 @@ class Legs:
             back = int(np.count_nonzero(time[1:] < time[:-1]))
             steps = time.size - 1
             if back > 1 and back > _MOST_BACK * steps:
-                problem = f"{leg.source}: time steps back at {back} of {steps} states, increasing times were expected"
+                problem = f"{leg.source}: time steps back at {back} of {steps} states"
                 raise FormatError(
-                    f"{problem}; check that this is the time (`time`) and the file is not damaged"
+                    f"{problem}, but increasing times were expected; check that this is the time (`time`) and the file "
+                    "is not damaged"
                 )
         all_times = _join_columns(times)
         keep, notes = find_newest_states(all_times)
@@ -489,8 +490,8 @@ def check_energy_of_parts(whole: Legs, holder: Legs, energies: Samples) -> None:
     if parts[state] - model[state] > tolerance > 0:
         raise FormatError(
             f"at {holder.part_time[in_parts][state]:.6g} the parts of {holder.source} have an energy of "
-            f"{parts[state]:.6g}, the whole model of {whole.source} has {model[state]:.6g}: "
-            "files of one run were expected; give those of one run"
+            f"{parts[state]:.6g}, and the whole model of {whole.source} has {model[state]:.6g}, "
+            "but files of one run were expected; give the files of one run"
         )
 
 

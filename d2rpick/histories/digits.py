@@ -187,8 +187,19 @@ def _find_next_printed(printed: float) -> float:
 def ask_for_smaller_unit(record: Samples, times: Sequence[float], argument: str) -> str:
     """Return text that asks whether an argument's times outside a ``record`` (n,) were given in a smaller unit.
 
-    The question is asked if the argument would lie inside the record in ms or us; otherwise the text is empty. An
-    argument that lies outside the record by less than its length is assumed to be in the unit of the record.
+    The text is empty if no smaller unit explains the values.
+    """
+    unit, values = find_smaller_unit(record, times)
+    return _ask_for_unit(unit, argument, values) if unit else ""
+
+
+def find_smaller_unit(
+    record: Samples, times: Sequence[float]
+) -> tuple[str, list[float]]:
+    """Return the smaller unit in which times outside a ``record`` (n,) lie inside it, and the converted times.
+
+    The unit is ms or us; it is empty if neither explains the values. Times that lie outside the record by less than its
+    length are assumed to be in the unit of the record.
     """
     first = float(record[0])
     last = float(record[-1])
@@ -196,14 +207,14 @@ def ask_for_smaller_unit(record: Samples, times: Sequence[float], argument: str)
         any(first <= time <= last for time in times if time)
         or times[-1] < 2 * last - first
     ):
-        return ""
+        return "", []
     earliest = max(first, 0.0) + _HARDLY_MEANT * (last - first)
     for unit, size in (("ms", 1e-3), ("us", 1e-6)):
         values = _scale_times(times, size)
         is_inside = all(first <= value <= last for value in values)
         if earliest <= values[-1] and is_inside:
-            return _ask_for_unit(unit, argument, values)
-    return ""
+            return unit, values
+    return "", []
 
 
 def ask_for_larger_unit(

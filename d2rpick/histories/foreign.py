@@ -195,7 +195,7 @@ def refuse_foreign(source: str, head: bytes) -> None:
         return
     if _is_deck(head):
         raise FormatError(
-            f"{source}: this is a deck, an energy history was expected; "
+            f"{source}: this is a deck, but an energy history was expected; "
             "name the glstat, matsum, binout or T01 of its run, and this file as `deck`"
         )
     _refuse(source, head, _TEXT_FORMATS)
@@ -213,7 +213,7 @@ def _refuse(source: str, head: bytes, formats: tuple[ForeignFormat, ...]) -> Non
     for foreign in formats:
         if re.match(foreign.pattern, head, re.DOTALL):
             raise FormatError(
-                f"{source}: this is {foreign.name}, an energy history was expected; {foreign.cure}"
+                f"{source}: this is {foreign.name}, but an energy history was expected; {foreign.cure}"
             )
 
 

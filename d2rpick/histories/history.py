@@ -335,7 +335,7 @@ class History:
             if not is_finite.all():
                 bad = int(is_finite.argmin())
                 raise HistoryError(
-                    f"{where}: {name} of state {bad + 1} is {values[bad]}, a finite number was expected"
+                    f"{where}: {name} of state {bad + 1} is {values[bad]}, but a finite number was expected"
                 )
         if np.any(time[1:] <= time[:-1]):
             state = int(np.argmax(np.diff(time) <= 0)) + 1
@@ -470,6 +470,34 @@ class History:
         verb = "reaches" if any(low <= time <= high for time in times) else "lies"
         raise RangeError(
             f"{', '.join(self.source)}: {described} {verb} outside the record, {first} to {last}{hint}"
+        )
+
+    def check_pair(self, tr: float, td: float, place: str = "") -> None:
+        """Raise RangeError if both times of a pair lie outside the record and fit it in a smaller unit.
+
+        The message begins with the ``place`` of the pair, such as a file; without one, it names the arguments.
+        """
+        low, high = self.time[0], self.time[-1]
+        if low <= tr <= high or low <= td <= high:
+            return
+        from d2rpick.histories.digits import find_smaller_unit
+
+        unit, values = find_smaller_unit(self.time, (tr, td))
+        if not unit:
+            return
+        first_tr, first_td, first, last = format_distinctly((tr, td, low, high))
+        record = f"outside the record of {', '.join(self.source)}, {first} to {last}"
+        asked = f"were they meant in {unit}? Then give"
+        if place:
+            problem = (
+                f"{place}: tr = {first_tr} and td = {first_td} lie {record}; {asked}"
+            )
+            raise RangeError(
+                f"{problem} {values[0]:g} {values[1]:g}, in the unit of the record"
+            )
+        raise RangeError(
+            f"`tr` {first_tr} and `td` {first_td} lie {record}; {asked} `tr` {values[0]:g} `td` {values[1]:g}, in the "
+            "unit of the record"
         )
 
     def check_length(self, length: float, *, argument: str) -> None:

@@ -72,7 +72,7 @@ def refuse_rows_of_parts(
     parts = find_part_column(columns, rows)
     if parts is None and not is_of_several_parts(time, energy):
         return
-    problem = f"{source}: each time stands {rows} times with different energies, one row for each time was expected"
+    problem = f"{source}: each time stands {rows} times with different energies, but one row for each time was expected"
     if parts is None:
         raise FormatError(f"{problem}; give the rows of one part")
     values = list_names(

@@ -184,7 +184,7 @@ def read_timing(path: str) -> Timing:
         timing = _read_d3hsp_timing(path, data)
     if timing is None or not timing.cycles or not 0 < timing.elements <= timing.total:
         raise FormatError(
-            f"{path}: no times of elements and of all work with their cycles were found, a Radioss listing "
+            f"{path}: no times of elements and of all work with their cycles were found, but a Radioss listing "
             "(NAME_0001.out, with /MON/ON) or a d3hsp of a run that has ended was expected"
         )
     return timing
@@ -203,7 +203,7 @@ def read_zone_times(path: str) -> ZoneTimes:
     times = times[times[:, 1] > 0]
     if not len(times):
         raise FormatError(
-            f"{path}: no time per zone cycle above 0 was found, a glstat of LS-DYNA was expected"
+            f"{path}: no time per zone cycle above 0 was found, but a glstat of LS-DYNA was expected"
         )
     return ZoneTimes(path, times[:, 0], times[:, 1] * 1e-9)
 

@@ -339,12 +339,39 @@ def note_other_quantity(channel: str) -> tuple[str, ...]:
     )
 
 
+def note_missed_energy(
+    chosen: Sequence[str], channels: Sequence[str]
+) -> tuple[str, ...]:
+    """Return a note if a channel without the name of an energy was chosen instead of an internal energy.
+
+    Examples
+    --------
+    >>> note_missed_energy(["z"], ["z", "internal_energy"])
+    ("'z' is not an energy by its name, but it was used, and 'internal_energy' was not",)
+    >>> note_missed_energy(["boxIE_J"], ["boxIE_J", "internal_energy"])
+    ()
+    """
+    others = [channels[i] for i in find_internal_energies(channels)]
+    odd = [name for name in chosen if not _has_name_of_energy(name)]
+    if not odd or not others or {*others} & {*chosen}:
+        return ()
+    was = "was" if len(others) == 1 else "were"
+    return (
+        (
+            f"{odd[0]!r} is not an energy by its name, but it was used, and "
+            f"{list_names([repr(name) for name in others], most=_MOST_NAMED)} {was} not"
+        ),
+    )
+
+
 def refuse_other_quantity(channel: str, where: str) -> None:
     """Raise FormatError if the only column or curve of a file has the name of a different quantity."""
     word = _find_word_of_other_quantity(channel)
     if word:
-        problem = f"{where}: the only values are {channel!r}, by its name not an internal energy ({word})"
-        raise FormatError(f"{problem}; choose with `energy` what to use instead")
+        problem = f"{where}: the only data column is {channel!r}, whose name is not an internal energy ({word})"
+        raise FormatError(
+            f"{problem}; write the internal energy too, or give this name as `energy` if it is one after all"
+        )
 
 
 def _find_word_of_other_quantity(channel: str) -> str:

@@ -246,6 +246,11 @@ def suggest_file(name: str) -> str:
         siblings = os.listdir(folder or ".")  # noqa: PTH208  pathlib would slow down start-up
     except OSError:
         return ""
+    with_space = [name for name in siblings if wanted and name.startswith(f"{wanted} ")]
+    if len(with_space) == 1:
+        return (
+            f" (did you mean {with_space[0]!r}? Put quotes around a name with spaces)"
+        )
     return suggest_name(wanted, siblings, _LIKENESS)
 
 
@@ -383,6 +388,8 @@ def _match_piece(
     if not numbers:
         if not titled:
             near = suggest_name(piece, [part.title for part in parts])
+            if re.fullmatch(r"\d+( +\d+)+", piece):
+                near = f" (separate parts by commas: {','.join(piece.split())})"
             raise FormatError(
                 f"{where}: no part {piece!r}{near}; there are: {list_parts(parts)}"
             )

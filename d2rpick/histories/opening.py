@@ -239,7 +239,7 @@ def _refuse_several_solvers(kinds: Mapping[str, Sequence[Source]]) -> None:
             f"{name} by {solver}" for solver, name in sorted(files.items())
         )
         raise FormatError(
-            f"{listed} were written by different solvers, files of one run were expected; give the files of one run"
+            f"{listed} were written by different solvers, but files of one run were expected; give the files of one run"
         )
 
 
@@ -326,7 +326,7 @@ def _note_left_out_file(source: Source, refusal: str) -> str:
     reason = (
         refusal.removeprefix(f"{source.name}: ")
         .partition(";")[0]
-        .removesuffix(", an energy history was expected")
+        .removesuffix(", but an energy history was expected")
     )
     return f"{source.name} was left out: {reason}"
 
@@ -499,7 +499,7 @@ def _detect_format(source: Source) -> str:
             "name the glstat, matsum, d3plot or binout of the run"
         )
     raise FormatError(
-        f"{source.name}: binary data of no known format, one of {', '.join(READERS)} was expected; "
+        f"{source.name}: binary data of no known format, but one of {', '.join(READERS)} was expected; "
         "export the energy history as text"
     )
 
@@ -529,7 +529,7 @@ def check_companions(databases: Sequence[Legs]) -> None:
             continue
         if first.span[0] > second.span[1] or second.span[0] > first.span[1]:
             raise FormatError(
-                f"{first.source} and {second.source} have no time in common, files of one run were expected"
+                f"{first.source} and {second.source} have no time in common, but files of one run were expected"
             )
 
 
@@ -593,7 +593,7 @@ def _check_starts(first: Database, second: Database) -> None:
 def _expect_legs(first: Database, second: Database, problem: str) -> FormatError:
     """Return the error for two files that are not restart segments of one run."""
     return FormatError(
-        f"{first.source} and {second.source} {problem}, restart segments of one run were expected; "
+        f"{first.source} and {second.source} {problem}, but restart segments of one run were expected; "
         "give the files of one run"
     )
 

@@ -25,6 +25,7 @@ from d2rpick.histories.history import (
 from d2rpick.histories.meaning import (
     is_any_internal_energy,
     is_total_internal_energy,
+    note_missed_energy,
     note_other_quantity,
     note_unused_energies,
 )
@@ -478,7 +479,7 @@ class OpenedRun:
                 f"{list_names(channels) or 'there are no channels'}"
             )
         sum_of_parts = self._of_parts(self.parts)
-        note = "the energies of all parts were added, those that stay deformable among them; choose with `parts`"
+        note = "the energies of all parts were added, including parts that stay deformable; choose with `parts`"
         return replace(
             sum_of_parts,
             channel="internal energy of all parts",
@@ -493,7 +494,10 @@ class OpenedRun:
             raise FormatError(f"{self.name}: an energy is given twice; name each once")
         columns = [database.channel(name) for name in names]
         channel = " + ".join(names)
-        notes = note_other_quantity(channel)
+        notes = (
+            *note_other_quantity(channel),
+            *note_missed_energy(names, database.channels),
+        )
         energy = columns[0] if len(columns) == 1 else np.sum(columns, axis=0)
         return self._history_of(
             database, database.time, energy, channel, names, notes, None

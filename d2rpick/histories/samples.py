@@ -225,7 +225,7 @@ def check_one_run(time: Samples, place: Callable[[int], str]) -> Samples:
     else:
         cure = "sort the rows, or put each curve into its own file"
     raise FormatError(
-        f"{problem}, increasing times or one restart were expected; {cure}"
+        f"{problem}, but increasing times or one restart were expected; {cure}"
     )
 
 

@@ -8,7 +8,7 @@ import stat
 import sys
 from typing import TYPE_CHECKING, Final
 
-from d2rpick.base.errors import FormatError, list_names
+from d2rpick.base.errors import SEVERAL_RUNS, FormatError, list_names
 from d2rpick.base.files import STDIN, FileState, bound, describe_unpacked_excess
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.histories.content import OnDisk, open_content, open_scattered
@@ -34,6 +34,8 @@ _NUMBER = r"\d+\.?\d*|\.\d+"
 # A table with this word in its first bytes is probably an energy history.
 _ENERGY_IN_HEAD: Final = b"energy"
 _HEAD_OF_TABLE: Final = 4096
+# Beginning of an address on the network, such as https://.
+_ADDRESS: Final = re.compile(r"[a-z]+://", re.IGNORECASE)
 # Suffixes of decks. A folder with decks but no databases belongs to a run that has not been computed yet.
 _DECKS: Final = (".k", ".key", ".dyn", ".rad")
 
@@ -234,7 +236,7 @@ def _list_databases(folder: Path) -> list[str]:
         )
     runs = sorted({*databases.values()})
     if len(runs) > 1:
-        problem = f"{folder}: this folder contains several runs ({list_names(runs, most=5)}), one was expected"
+        problem = f"{folder}: this folder contains {SEVERAL_RUNS} ({list_names(runs, most=5)}), but one was expected"
         raise FormatError(f"{problem}; give the files of one run")
     return [str(file) for file in databases]
 
@@ -309,6 +311,15 @@ def _read_file(name: str) -> bytes | OnDisk:
 
 def _report_unread(name: str, error: OSError | ValueError) -> FormatError:
     """Return the error for a file that cannot be read."""
+    if isinstance(error, FileNotFoundError) and os.path.islink(name):  # noqa: PTH114  pathlib would slow down start-up
+        target = os.readlink(name)  # noqa: PTH115  pathlib would slow down start-up
+        return FormatError(
+            f"{name}: this link leads to {target}, which does not exist; give the file itself, or correct the link"
+        )
+    if isinstance(error, FileNotFoundError) and _ADDRESS.match(name):
+        return FormatError(
+            f"{name}: an address on the network cannot be read; download the file, and give its name"
+        )
     if isinstance(error, FileNotFoundError):
         return FormatError(
             f"{name}: no such file{_suggest_file(name)}; check the name and the folder"

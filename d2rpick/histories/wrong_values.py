@@ -173,7 +173,7 @@ def _refuse(
     if not place:
         place = f"{', '.join(file.name for file in files)}, state {state + 1}"
     return HistoryError(
-        f"{place}: {column.name} is {value:.6g} in the single state at {time:.6g}, {expected} was expected; "
+        f"{place}: {column.name} is {value:.6g} in the single state at {time:.6g}, but {expected} was expected; "
         f"repair or delete the {unit}"
     )
 

@@ -90,14 +90,14 @@ class Parameters:
         for name, value in vars(self).items():
             if value is not None and not (np.isfinite(value) and value >= 0):
                 raise RangeError(
-                    f"{name} is {value}, a number of at least 0 was expected"
+                    f"{name} is {value}, but a number of at least 0 was expected"
                 )
         for name in _POSITIVE:
             if not getattr(self, name) > 0:
-                raise RangeError(f"{name} is 0, a positive number was expected")
+                raise RangeError(f"{name} is 0, but a positive number was expected")
         if self.mesh < _COARSEST:
             raise RangeError(
-                f"mesh is {self.mesh}, at least {_COARSEST} cells along each side were expected"
+                f"mesh is {self.mesh}, but at least {_COARSEST} cells along each side were expected"
             )
 
 

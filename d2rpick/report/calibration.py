@@ -39,7 +39,12 @@ DOCUMENT: Final = Document("d2rpick/calibrate/1", "Answer of d2rpick calibrate; 
 ), closed=True)  # fmt: skip
 HEAD = ("formulation", "weight [us]", "built-in [us]", "source")
 COLUMNS = ("formulation", "weight", "measured", "told")
-LEG_HEAD = ("run", "CPU time of a step", "of the elements", "rigid nodes")
+LEG_HEAD = (
+    "run",
+    "CPU time of a step",
+    "CPU time of elements",
+    "rigid nodes",
+)
 # Weights with a misfit up to this need no caution [-]; it is twice the CPU-time error that the fit assumes.
 _SMALL_MISFIT: Final = 0.1
 # Names of formulations that the solvers do not have.

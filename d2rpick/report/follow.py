@@ -57,12 +57,17 @@ def describe_news(
     selected = ("--part", ",".join(parts)) if parts else ()
     nothing_read = News()
     news, is_over, step = nothing_read, False, ""
-    for news_before, news in pairwise(chain([nothing_read], reads)):
+    for number, (news_before, news) in enumerate(
+        pairwise(chain([nothing_read], reads))
+    ):
         step = _name_step_after_end(news, (*names, *news.later_files), selected)
         if news.now != news_before.now:
             is_over = False
         if news.ending or news.silence:
             is_over = True
+        # A single read is described by the last event.
+        if number == 1 and news.now is None and not news.error:
+            yield Event("waiting", None, None, _describe_missing_files(names))
         yield from _describe_states(news_before, news, step)
         for event in news.events:
             yield _describe_event(event, is_past=is_over)
@@ -136,7 +141,7 @@ def _describe_event(event: RunEvent, *, is_past: bool) -> Event:
     else:
         message = _describe_advice(event, flight.wait)
         if is_past:
-            message = f"advice that came during the run: {message}"
+            message = f"advice during the run, now out of date: {message}"
     wait = flight.wait.time
     return Event(event.event, event.time, event.seen, message, wait, left, event.tr)
 
@@ -172,8 +177,8 @@ def _describe_advice(event: RunEvent, wait: Wait) -> str:
             f"waiting until {event.time:.6g} for its maximum"
         )
     return (
-        f"switch now: the internal energy, {energy:.4g}, is near {span}; it is not compared with the energy at td, "
-        f"which is unknown yet{warning}"
+        f"switch now: the internal energy, {energy:.4g}, is near {span}; it was not compared with the energy at td, "
+        f"which is not known yet{warning}"
     )
 
 
@@ -191,11 +196,16 @@ def _describe_end(news_before: News, news: News, step: str) -> Iterator[Event]:
         yield Event("silent", news.now, news.now, message)
 
 
+def _describe_missing_files(names: Sequence[str]) -> str:
+    """State that no file of the run exists yet, with a similar name if none of the names exists."""
+    similar = "" if any(map(os.path.exists, names)) else suggest_file(names[0])
+    return f"{list_names(names)}: no file of a run yet{similar}; check the name if the run has begun"
+
+
 def _describe_last_state(news: News, names: Sequence[str], step: str) -> Event:
     """State whether the parts are flying now, and since when; ``step`` is the next step once the run is over, or ""."""
     if news.now is None:
-        similar = "" if any(map(os.path.exists, names)) else suggest_file(names[0])
-        message = f"{list_names(names)}: no file of a run yet{similar}; check the name if the run has begun"
+        message = _describe_missing_files(names)
         if news.error:
             message = f"cannot be read yet: {news.error}"
         return Event("state", None, None, message)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from typing import TYPE_CHECKING, Final, cast
 
 from d2rpick.base.errors import FormatError, make_printable
@@ -48,6 +49,10 @@ def choose_history_format(
 
     if name is None:
         return asked or "csv"
+    if os.path.isdir(name):  # noqa: PTH112  pathlib would slow down start-up
+        raise FormatError(
+            f"{make_printable(name)}: this is a folder; give a file in it"
+        )
     path = PurePath(name.lower())
     if path.suffix in _WORKBOOKS:
         table = make_printable(str(PurePath(name).with_suffix(".csv")))

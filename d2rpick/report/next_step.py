@@ -263,8 +263,13 @@ def ask_for_states_that_show_flight(states: int, start: float, end: float) -> st
     if states >= ENOUGH_STATES:
         return ""
     interval = (end - start) / ENOUGH_STATES
-    more = f"write the states every {interval:.2g} or more often"
-    return f"{more}, because {states} states may miss a flight; if no flight is found even then, "
+    often = f"every {interval:.2g} or more often" if interval else "more often"
+    may_miss = "1 state shows" if states == 1 else f"{states} states may miss"
+    what = "no flight" if states == 1 else "a flight"
+    return (
+        f"continue the run if it has not reached a flight, or write the states {often}, because {may_miss} {what}; "
+        "if no flight is found even then, "
+    )
 
 
 def name_lack_of_pairs(question: RepeatedQuestion) -> str:
@@ -309,6 +314,7 @@ def name_step_without_flight(history: History, question: RepeatedQuestion) -> st
     """Return the step if no flight is found; the end of the load is asked for unless the momentum shows no flight."""
     # Imported here, because a card without a history needs no numpy.
     from d2rpick.flight.flight import NEVER_FLIES, denies_every_flight
+    from d2rpick.histories.samples import find_holes
 
     more = ask_for_states_that_show_flight(
         history.time.size, history.start, history.end
@@ -317,6 +323,14 @@ def name_step_without_flight(history: History, question: RepeatedQuestion) -> st
     if not history.energy.any():
         return f"choose the internal energy as `energy`; {line} names the columns"
     look = f"see what the run has to write with {line}"
+    if history.energy.min() == history.energy.max():
+        return (
+            f"choose parts that deform or another energy, because the energy is {history.energy[0]:.6g} in all states; "
+            f"{line} names what the files contain"
+        )
+    if holes := find_holes(history.time):
+        first, last = holes[0]
+        return f"add the files of the restart segment that is missing between {first:.6g} and {last:.6g}"
     if not denies_every_flight(history):
         return f"{more}{look}, or give the end of the load as --after"
     no_pair = f"{more}{name_lack_of_pairs(question)}: {NEVER_FLIES}"

@@ -100,8 +100,9 @@ _PARTS_HEAD = ("part", "title", "highest internal energy")
 # Whether times can be chosen from the record. The verdict on a pair uses similar words, so the sentence names the
 # record, and leaves the verdict on its windows to `plan`.
 _RECORD: Final = {
-    USE: "can be used to choose times: it has flights, and d2rpick plan judges the windows in them",
-    USE_WITH_CARE: "can be used with care to choose times: it has flights, and d2rpick plan judges the windows in them",
+    USE: "suitable for choosing times: it contains flights (d2rpick plan judges the windows in them)",
+    USE_WITH_CARE: "suitable with care for choosing times: it contains flights (d2rpick plan judges the windows in "
+    "them)",
     DO_NOT_USE: "do not use it to choose times",
 }
 _NOT_JUDGED: Final = (
@@ -117,7 +118,7 @@ _EXPLAIN_LOAD: Final = (
     "because it defines gravity and loads"
 )
 # Statement that no file names the unit of time.
-_UNNAMED: Final = "not named by the files: all values are in the units of the run"
+_UNNAMED: Final = "unknown: the files do not name it (units of the run)"
 # Keys of the JSON output whose value is neither a list nor an object.
 _PLAIN = (
     "format",

@@ -448,7 +448,10 @@ def list_verdict_on_set(answer: Parts) -> list[tuple[str, str]]:
     best = answer.recommended
     if best is None and not answer.files.parts:
         return [
-            ("make rigid", "unknown: this history does not contain single parts"),
+            (
+                "make rigid",
+                "unknown: the history contains no data for individual parts",
+            ),
             ("to improve", _NAME_HISTORY_WITH_PARTS),
         ]
     if best is None and answer.inventory is None:

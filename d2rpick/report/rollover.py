@@ -90,7 +90,7 @@ def as_table(scan: Scan, display: DisplayOptions) -> str:
     above = [
         (
             "load",
-            f"until {_format_time(reference.released)} s, next contact at {_format_time(reference.landed)} s",
+            f"until {_format_time(reference.released)} s; next contact: {_describe_landing(reference.landed)}",
         ),
         (
             "td",
@@ -145,6 +145,11 @@ def _list_short_values(outcome: Outcome) -> list[tables.Cell]:
 
 def _format_time(time: float | None) -> str:
     return "-" if time is None else f"{time:.6g}"
+
+
+def _describe_landing(time: float | None) -> str:
+    """Return the time of the next contact as text; say so if the run ends before it."""
+    return "none before the end of the run" if time is None else f"at {time:.6g} s"
 
 
 def _interpolate_energy(reference: Record, time: float) -> float:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from d2rpick.base.errors import ConfigurationError
+from d2rpick.histories.names import suggest_name
 from d2rpick.report import tables
 from d2rpick.rules import RULES, find_rules
 from d2rpick.rules.example import MAIN_DECK
@@ -47,9 +49,15 @@ def _explain_matching_rules(
     """Explain the rules whose id begins with ``name``, or the warning with this code."""
     from d2rpick.report.warning_texts import EXPLANATIONS, explain_warning
 
-    if name in EXPLANATIONS:
-        yield tables.wrap_lines(explain_warning(name), width)
+    code = name.lower().replace("_", "-")
+    if code in EXPLANATIONS:
+        yield tables.wrap_lines(explain_warning(code), width)
         return
+    if "-" in code:
+        near = suggest_name(code, tuple(EXPLANATIONS))
+        raise ConfigurationError(
+            f"no warning {name!r}{near}; d2rpick prints the code of a warning before its text"
+        )
     for rule in find_rules(name):
         yield explain_rule(rule, width, with_examples=with_examples)
 

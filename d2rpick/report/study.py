@@ -17,6 +17,7 @@ from d2rpick.choice.runs.study import (
     StudyOfRuns,
     StudyRow,
     describe_end_of_record,
+    explain_left_out,
     find_cut_runs,
     find_repeated_runs,
     format_number_of_runs,
@@ -283,14 +284,20 @@ def list_outcome(answer: StudyOfRuns) -> list[tuple[str, str]]:
     if common.tr is not None and common.window:
         errors = [error for error in common.errors if error is not None]
         heading = VERDICTS[answer.grade] if answer.grade else heading
-        runs = f"{answer.judged} of {format_number_of_runs(len(answer.runs))}"
+        # A run that was given twice counts once.
+        repeated = _count_repetitions(answer)
+        different = answer.judged - repeated
+        runs = f"{different} of {format_number_of_runs(len(answer.runs) - repeated)}"
+        if repeated:
+            runs += " (repeated runs count once)"
         # Nothing is common to a single run.
-        name = "tr" if answer.judged == 1 else "common tr"
+        name = "tr" if different == 1 else "common tr"
         shared = f"{name} = {common.tr:g}, for {runs}, {_name_error(answer)} {_format_error_span(errors)}"
         shared += f"; as good: every tr from {format_window(*common.window)}"
     return [
         (heading, shared),
         ("each run", _count_verdicts(answer)),
+        *_list_left_out(answer),
         *_list_repetitions(answer),
         *_list_judged_energies(answer),
         ("td", describe_td(answer)),
@@ -341,9 +348,23 @@ def _format_error_span(errors: Sequence[float]) -> str:
     return low if low == high else f"{low} to {high}"
 
 
+def _count_repetitions(answer: StudyOfRuns) -> int:
+    """Return the number of runs that have the same content as an earlier run."""
+    return sum(len(group) - 1 for group in find_repeated_runs(answer.runs))
+
+
+def _list_left_out(answer: StudyOfRuns) -> list[tuple[str, str]]:
+    """Return the first run that could not be judged, with the reason; empty if all or none could be judged."""
+    rows = [row for row in answer.runs if not row.judged]
+    if not rows or not answer.judged:
+        return []
+    more = f"; {len(rows) - 1} more in the table" if len(rows) > 1 else ""
+    return [("left out", f"{explain_left_out(rows[0])}{more}")]
+
+
 def _list_repetitions(answer: StudyOfRuns) -> list[tuple[str, str]]:
     """Describe how many runs have the same content as another run; empty if all runs differ."""
-    count = sum(len(group) - 1 for group in find_repeated_runs(answer.runs))
+    count = _count_repetitions(answer)
     if not count:
         return []
     have = "has" if count == 1 else "have"
@@ -425,14 +446,13 @@ def list_next_step(
     of_worst = question._replace(files=(worst.source,))
     better_td = _find_shared_better_td(answer)
     if worst.quality == POOR and better_td is not None:
-        readable = tuple(row.source for row in answer.runs if row.judged)
-        of_readable = question._replace(files=readable)
+        of_readable = question._replace(files=_list_different_runs(answer))
         line = write_command(of_readable, "study", "--td", f"{better_td:.6g}")
         step = f"judge all runs at the better td with {line}"
     elif worst.quality == POOR:
         line = write_command(of_worst, "suggest", *question.times)
         step = f"look at the first of the worst runs with {line}"
-    elif len(judged) == 1:
+    elif len(judged) - _count_repetitions(answer) == 1:
         line = write_command(of_worst, "suggest", *question.times)
         step = f"look at the run that was judged with {line}"
     elif answer.common.tr is None:
@@ -444,8 +464,7 @@ def list_next_step(
         )
     elif answer.td is None:
         earliest = min(row.td for row in judged if row.td is not None)
-        readable = tuple(row.source for row in answer.runs if row.judged)
-        of_readable = question._replace(files=readable)
+        of_readable = question._replace(files=_list_different_runs(answer))
         line = write_command(of_readable, "study", "--td", f"{earliest:.6g}")
         step = f"choose one td for all runs, for example the earliest, with {line}"
     else:
@@ -453,6 +472,16 @@ def list_next_step(
         line = write_command(of_worst, "verify", *times)
         step = f"judge the common pair in the worst run with {line}"
     return [("next", step)]
+
+
+def _list_different_runs(answer: StudyOfRuns) -> tuple[str, ...]:
+    """Return the names of the judged runs, each content once."""
+    repeated = {
+        id(row) for group in find_repeated_runs(answer.runs) for row in group[1:]
+    }
+    return tuple(
+        row.source for row in answer.runs if row.judged and id(row) not in repeated
+    )
 
 
 def _find_shared_better_td(answer: StudyOfRuns) -> float | None:

@@ -207,6 +207,10 @@ def list_comparison(answer: PairVerdict) -> list[tuple[str, str]]:
     is_within = _contradicts_verdict(switched, answer.decision)
     if is_within:
         verdict = "within limits, although the pair was poor"
+    elif switched.objections and _are_values_within_limits(switched):
+        verdict = (
+            "failed for the reason below, although these values are within their limits"
+        )
     elif switched.objections:
         verdict = "failed"
     else:
@@ -244,6 +248,17 @@ def _describe_missing_energy(switched: Comparison, decision: Decision) -> str:
 def _contradicts_verdict(switched: Comparison, decision: Decision) -> bool:
     """Return True if the comparison exceeds no limit, but the pair is not to be used."""
     return not switched.objections and decision.verdict == DO_NOT_USE
+
+
+def _are_values_within_limits(switched: Comparison) -> bool:
+    """Return True if values are compared and none exceeds its limit, so that the comparison failed otherwise."""
+    within = []
+    if switched.has_energy and switched.mean_after is not None:
+        ratio = switched.mean_after / switched.mean_after_reference
+        within.append(switched.min_mean <= ratio <= 2 - switched.min_mean)
+    if switched.momentum_error is not None:
+        within.append(switched.momentum_error <= MOST_MOMENTUM_ERROR)
+    return bool(within) and all(within)
 
 
 def _list_limited_values(switched: Comparison) -> list[str]:
@@ -390,7 +405,7 @@ def list_deviations(switched: Comparison) -> list[tuple[str, str]]:
     rows = []
     if error is not None:
         rows.append(
-            ("largest error of the momentum after td", f"{error:.2g} of its maximum")
+            ("largest momentum error after td", f"{error:.2g} of the largest momentum")
         )
     if displacement is not None:
         rows.append(("largest displacement after td", f"{displacement:.3g}"))

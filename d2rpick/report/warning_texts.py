@@ -429,7 +429,8 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "Name the same parts for all runs by their numbers with --part.",
         ),
         "mixed-units": Explanation(
-            "The runs have different time units, but td is a single value.",
+            "The runs have different time units, by their files or because the times of some are 1000 times those of "
+            "others. A study has one unit for td and tr.",
             "Convert the runs to one unit, or study the runs of each unit separately.",
         ),
         "runs-left-out": Explanation(

@@ -163,7 +163,7 @@ def read_configuration(
     if not isinstance(severity, Mapping):
         problem = f"{source}: severity is {format_toml_value(severity)}"
         raise ConfigurationError(
-            f"{problem}, a table like {{D2R104 = 'warning'}} was expected"
+            f"{problem}, but a table like {{D2R104 = 'warning'}} was expected"
         )
     for rule, value in severity.items():
         if value not in [*Severity]:
@@ -186,7 +186,7 @@ def _read_rule_names(
     value = table.get(key, [])
     if not isinstance(value, list) or not all(isinstance(name, str) for name in value):
         raise ConfigurationError(
-            f"{source}: {key} is {format_toml_value(value)}, a list of rule ids was expected"
+            f"{source}: {key} is {format_toml_value(value)}, but a list of rule ids was expected"
         )
     return tuple(value)
 

@@ -140,6 +140,12 @@ class _Joining(NamedTuple):
         return self.body_count == 1 and not self.deformable
 
     @property
+    def is_joint_between_bodies(self) -> bool:
+        """Return True for a joint between rigid bodies, which may stay active."""
+        is_joint = self.constraint.kind == "joint"
+        return is_joint and self.body_count > 1 and not self.deformable
+
+    @property
     def name(self) -> str:
         """Return the kind of the constraint, with its id if it has one."""
         if self.constraint.id:
@@ -202,7 +208,7 @@ def _find_active(
     """
     for joining in _find_joinings(case, kinds):
         keeping = joining.find_card(deletes=False)
-        if keeping is None:
+        if keeping is None or joining.is_joint_between_bodies:
             continue
         part, flags = keeping
         described = flags.describe(joining.constraint.kind)
@@ -300,6 +306,7 @@ def _check_separated_parts(case: Case) -> Iterator[PlacedMessage]:
 @set_passing(
     lambda: [
         PASS,
+        _make_joined_deck(_JOINING_JOINT, "         0         0", "1", "2"),
         _make_constrained_deck(_EXTRA, "         0         1"),
         _make_constrained_deck(_JOINT, "         1         0"),
         _make_constrained_deck(_SPOTWELD, "         0         1"),
@@ -324,7 +331,7 @@ def _check_other_constraints(case: Case) -> Iterator[PlacedMessage]:
     invalid for a rigid body: they must be deleted while the part is rigid, and activated again when it is switched
     back. NCSF deletes spotwelds and other nodal constraints, such as rivets and constrained node sets. NRBF deletes
     generalized welds. No available source states which flag deletes joints and extra nodes, so NRBF 1 or NCSF 1
-    satisfies this rule.
+    satisfies this rule. A joint between separate rigid bodies may stay active, and is not reported.
 
     Fix: Set the flag to 1 on the card that makes the part rigid and to 2 on the card that switches it back: NCSF for
     spotwelds, rivets and node sets, NRBF for generalized welds. For joints and extra nodes, set NCSF, and NRBF too if

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import list_names
@@ -36,6 +37,8 @@ if TYPE_CHECKING:
     from d2rpick.rules.by_sensor import Sensed
 
 _MOST_LISTED: Final = 8
+# Gap between two values of a line with columns, inside a text that was read as one field.
+_BETWEEN_COLUMNS: Final = r"\S {2,}\S"
 _CURES: Final = {
     "no such file": "add the file or its *INCLUDE_PATH",
     UNKNOWN_KIND: "check that file separately",
@@ -148,8 +151,7 @@ def _check_fields(case: Case) -> Iterator[PlacedMessage]:
             f"{head!r} is not a switching keyword, so its lines were not read; did you mean {near}?",
         )
     for card in case.sets:
-        for field, problem in card.problems:
-            yield field, f"{problem}; check its columns and its parameters"
+        yield from _list_unreadable_fields(card)
     if case.sets:
         for field, problem in (*case.parts.problems, *_find_unreadable_members(case)):
             yield field, f"{problem}; it is needed to know which parts are switched"
@@ -159,6 +161,25 @@ def _check_fields(case: Case) -> Iterator[PlacedMessage]:
                     value.field,
                     f"{value.problem}; *{card_of_time.name} is needed to judge the switching times",
                 )
+
+
+def _list_unreadable_fields(card: SwitchSet) -> Iterator[PlacedMessage]:
+    """Yield the unreadable fields of a switching card; of a line with a decimal comma only the first."""
+    lines_with_comma = set()
+    for field, problem in card.problems:
+        if not re.search(_BETWEEN_COLUMNS, field.text):
+            yield field, f"{problem}; check its columns and its parameters"
+            continue
+        if field.line not in lines_with_comma:
+            lines_with_comma.add(field.line)
+            words = " ".join(field.text.split())
+            yield (
+                field,
+                (
+                    f"{words!r} is not a number: because of a comma in this line, its fields are not read by columns; "
+                    "write decimal numbers with a point, 0.012 for 0,012"
+                ),
+            )
 
 
 def _find_unreadable_members(case: Case) -> Iterator[Problem]:

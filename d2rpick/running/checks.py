@@ -22,8 +22,9 @@ def refuse_held(path: str, inventory: Inventory, parts: Collection[int]) -> None
     """Raise DeckError if a support holds one of the parts, because a support force is not a contact force."""
     unknown = sorted(set(parts) - inventory.nodes_by_part.keys())
     if unknown:
+        known = name_units(inventory.nodes_by_part)
         raise DeckError(
-            f"{path}: {name_units(unknown)}: no elements in the deck; name others"
+            f"{path}: {name_units(unknown)}: no elements in the deck; give others with `parts`: the deck has {known}"
         )
     held = find_supports(inventory)[0]
     for part in sorted(held.keys() & set(parts)):

@@ -107,7 +107,8 @@ class Commands(NamedTuple):
         are = "is" if len(unknown) == 1 else "are"
         options = " and ".join(f"--{name} 'CMD {{deck}}'" for name in unknown)
         return ConfigurationError(
-            f"no {names} {are} known; set {_HOME} to the folder of OpenRadioss, or give {options}"
+            f"no {names} {are} known, so no command can be started or printed; set {_HOME} to the folder of "
+            f"OpenRadioss, or give {options}"
         )
 
     def make_environment(self) -> dict[str, str]:

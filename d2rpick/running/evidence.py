@@ -168,7 +168,7 @@ class GrowingEvidence:
         if self.given is not None:
             reason = "as given"
             if longest is not None and longest.time > self.given:
-                reason = f"as given, but {longest.reason}"
+                reason = f"as given, but a longer half cycle is known: {longest.reason}"
             return Wait(self.given, "given", reason)
         first_times = self.history.time[:FEWEST]
         begins_free = first_times.size == FEWEST and start <= first_times[-1]

@@ -55,9 +55,9 @@ def first_card(
     """
     inventory = read_inventory(path)
     chosen = tuple(parts) or _find_default_parts(path, inventory)
+    refuse_held(path, inventory, chosen)
     if needs := [*_list_needs(inventory, bool(chosen), wait)]:
         raise ArgumentError(f"{path}: missing: {'; '.join(needs)}")
-    refuse_held(path, inventory, chosen)
     needed = _choose_wait(path, inventory, wait)
     first_run = FirstRunDeck(path, inventory, chosen, needed.time, needed.reason, after)
     return print_first_run_cards(first_run), needed

@@ -286,7 +286,7 @@ class InnerMotion:
             longest = longest._replace(swing=max(longest.swing, half))
             counts = is_free or not (motion.has_free_swing or self._least)
             if counts and (longest.wait is None or swing.half > longest.wait.time):
-                reason = f"{motion.name} took {swing.half:.3g} for half a period, until {swing.seen_at:.6g}"
+                reason = f"half cycle of {motion.name}: {swing.half:.3g}, completed at {swing.seen_at:.6g}"
                 longest = longest._replace(wait=Wait(swing.half, "record", reason))
             so_far[-1] = longest
 

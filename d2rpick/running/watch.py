@@ -11,7 +11,12 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from d2rpick.base.errors import FormatError, HistoryError, RangeError
+from d2rpick.base.errors import (
+    SEVERAL_RUNS,
+    FormatError,
+    HistoryError,
+    RangeError,
+)
 from d2rpick.choice.switched.frozen import find_frozen_times
 from d2rpick.histories.listings import find_ending
 from d2rpick.histories.source import expand, find_later_legs
@@ -194,7 +199,7 @@ def find_files(names: Sequence[str]) -> dict[str, FileStamp]:
     try:
         paths = expand(names)
     except FormatError as error:
-        if "several runs" in str(error):
+        if SEVERAL_RUNS in str(error):
             raise
         return {}
     files = {}

@@ -67,10 +67,10 @@ class Oscillator:
             if not _SMALLEST <= getattr(self, name) <= _LARGEST:
                 finding = f"{name} is {getattr(self, name)}"
                 raise RangeError(
-                    f"{finding}, a positive number from {_SMALLEST:g} to {_LARGEST:g} was expected"
+                    f"{finding}, but a positive number from {_SMALLEST:g} to {_LARGEST:g} was expected"
                 )
         if not np.isfinite(self.alpha):
-            raise RangeError(f"alpha is {self.alpha}, a finite number was expected")
+            raise RangeError(f"alpha is {self.alpha}, but a finite number was expected")
 
     @property
     def reduced_mass(self) -> float:
@@ -292,7 +292,7 @@ def to_mode(oscillator: Oscillator, v0: float) -> Mode:
     if not omega > 0:
         finding = f"alpha {oscillator.alpha:g} overdamps the oscillator, whose rate is {oscillator.omega_0:g}"
         raise RangeError(
-            f"{finding}, less than {2 * oscillator.omega_0:g} was expected"
+            f"{finding}, but less than {2 * oscillator.omega_0:g} was expected"
         )
     sine = -v0 / omega * sqrt(oscillator.stiffness / 2)
     if not abs(sine) <= sqrt(LARGEST_ENERGY):

@@ -581,18 +581,18 @@ def test_no_pair_is_no_card() -> None:
         (
             {"solver": "abaqus"},
             ValueError,
-            "solver is 'abaqus', one of ls-dyna, radioss",
+            "solver is 'abaqus', but one of ls-dyna, radioss",
         ),
-        ({"solver": 3}, TypeError, "solver is 3, a text"),
+        ({"solver": 3}, TypeError, "solver is 3, but a text"),
         (
             {"marge": 1},
             TypeError,
             "no argument 'marge'; is 'margin' meant|is 'merge' meant",
         ),
-        ({"merge": 0}, ValueError, "merge is 0, a number of at least 1"),
-        ({"swset": 5}, TypeError, "swset is 5, a pair of numbers"),
-        ({"step_cap": "x"}, TypeError, "step_cap is 'x', a number"),
-        ({"step_cap": 0}, ValueError, "step_cap is 0, a number above 0"),
+        ({"merge": 0}, ValueError, "merge is 0, but a number of at least 1"),
+        ({"swset": 5}, TypeError, "swset is 5, but a pair of numbers"),
+        ({"step_cap": "x"}, TypeError, "step_cap is 'x', but a number"),
+        ({"step_cap": 0}, ValueError, "step_cap is 0, but a number above 0"),
         ({"node": 5}, ValueError, "`node` is an option of `solver` radioss"),
         ({}, ValueError, "needs `parts`, the parts to switch"),
     ],
@@ -619,7 +619,7 @@ def test_a_figure_shows_itself() -> None:
         (
             lambda: loose.read(ENERGY, channels={"joy": "z"}),
             ValueError,
-            "channels names 'joy', one of",
+            "channels names 'joy', but one of",
         ),
         (
             lambda: loose.read(ENERGY, channels={"kinetic_energy": 1.5}),
@@ -634,7 +634,7 @@ def test_a_figure_shows_itself() -> None:
         (
             lambda: loose.suggest(d2.read(ENERGY), "0.064"),
             TypeError,
-            "td is '0.064', a number was expected",
+            "td is '0.064', but a number was expected",
         ),
         (
             lambda: loose.suggest(d2.read(ENERGY), "64ms"),
@@ -669,7 +669,7 @@ def test_a_figure_shows_itself() -> None:
         (
             lambda: loose.suggest(d2.read(ENERGY), 0.06, margin=-1),
             ValueError,
-            "margin is -1, a number of at least 0",
+            "margin is -1, but a number of at least 0",
         ),
         (
             lambda: loose.suggest(d2.read(ENERGY), 0.06, tolerance="a"),
@@ -679,37 +679,37 @@ def test_a_figure_shows_itself() -> None:
         (
             lambda: loose.suggest(d2.read(ENERGY), np.array([1, 2])),
             TypeError,
-            r"td is array\(\[1, 2\]\), a number",
+            r"td is array\(\[1, 2\]\), but a number",
         ),
         (
             lambda: loose.suggest(d2.read(ENERGY), np.True_),
             TypeError,
-            "td is .*True_?, a number was expected",
+            "td is .*True_?, but a number was expected",
         ),
         (
             lambda: loose.suggest(d2.read(ENERGY), 0.06, replay="no"),
             TypeError,
-            "replay is 'no', True or False",
+            "replay is 'no', but True or False",
         ),
         (
             lambda: loose.suggest(d2.read(ENERGY), 0.06, strict=1),
             TypeError,
-            "strict is 1, True or False",
+            "strict is 1, but True or False",
         ),
         (
             lambda: loose.suggest(d2.read(ENERGY), 0.06, oscillator=5, v0=1.0),
             TypeError,
-            "oscillator is 5, a d2rpick",
+            "oscillator is 5, but a d2rpick",
         ),
         (
             lambda: loose.suggest(d2.read(ENERGY), td_window={1, 2}),
             TypeError,
-            "td_window is .*, a pair of times",
+            "td_window is .*, but a pair of times",
         ),
         (
             lambda: loose.suggest(d2.read(ENERGY), td_window=np.eye(2)),
             TypeError,
-            "td_window is .*, a pair of times",
+            "td_window is .*, but a pair of times",
         ),
         (
             lambda: loose.suggest(d2.read(BOX), 0.3, parts={1: "a"}),
@@ -724,7 +724,7 @@ def test_a_figure_shows_itself() -> None:
         (
             lambda: loose.suggest(d2.read(BOX), 0.3, deck=DECK, weights=3),
             TypeError,
-            "weights is 3, d2rpick.Weights or",
+            "weights is 3, but d2rpick.Weights or",
         ),
         (
             lambda: loose.verify(d2.read(ENERGY), switched=ENERGY),
@@ -739,7 +739,7 @@ def test_a_figure_shows_itself() -> None:
         (
             lambda: loose.plan(d2.read(ENERGY), done=[0.1]),
             TypeError,
-            r"done\[0\] is 0.1, a pair of times",
+            r"done\[0\] is 0.1, but a pair of times",
         ),
         (
             lambda: loose.plan(d2.read(ENERGY), before="a", done=[(0.1, 0.2)]),
@@ -749,17 +749,17 @@ def test_a_figure_shows_itself() -> None:
         (
             lambda: loose.read(ENERGY, energy=1.5),
             TypeError,
-            "energy is 1.5, the name or number of a column",
+            "energy is 1.5, but the name or number of a column",
         ),
         (
             lambda: loose.read(ENERGY, channels=["a"]),
             TypeError,
-            r"channels is \['a'\], a mapping",
+            r"channels is \['a'\], but a mapping",
         ),
         (
             lambda: loose.read(ENERGY, input_format=3),
             TypeError,
-            "input_format is 3, a text was expected",
+            "input_format is 3, but a text was expected",
         ),
         (
             lambda: loose.read(pd.DataFrame({"t": [1.0]})),
@@ -774,12 +774,12 @@ def test_a_figure_shows_itself() -> None:
         (
             lambda: loose.from_frame(np.zeros(3)),
             TypeError,
-            r"frame is an array of shape \(3,\), a table was expected",
+            r"frame is an array of shape \(3,\), but a table was expected",
         ),
         (
             lambda: loose.from_frame({"t": [1.0]}, name=3),
             TypeError,
-            "name is 3, a text was expected",
+            "name is 3, but a text was expected",
         ),
         (
             lambda: loose.card(5, parts=1),
@@ -900,19 +900,19 @@ def test_a_figure_shows_itself() -> None:
         (
             lambda: loose.read(ENERGY, input_format="exel"),
             ValueError,
-            "input_format is 'exel', one of auto, binout",
+            "input_format is 'exel', but one of auto, binout",
         ),
         (lambda: loose.from_frame([1, 2]), TypeError, "frame is of type list"),
         (lambda: loose.study([ENERGY], 0.06, jobs=0), ValueError, "jobs is 0"),
         (
             lambda: loose.study([ENERGY], 0.06, jobs=1.5),
             TypeError,
-            "jobs is 1.5, a whole number was expected",
+            "jobs is 1.5, but a whole number was expected",
         ),
         (
             lambda: loose.explore(d2.read(ENERGY), steps=2.5),
             TypeError,
-            "steps is 2.5, a whole number was expected",
+            "steps is 2.5, but a whole number was expected",
         ),
         (
             lambda: loose.suggest(d2.read(BOX), 0.3, parts=1.5),

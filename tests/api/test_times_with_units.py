@@ -122,12 +122,14 @@ def test_without_a_unit_of_the_run_both_numbers_are_named() -> None:
 
 def test_limits_and_kinds_hold_for_texts_too(tmp_path: Path) -> None:
     run = d2.read(write_in(tmp_path, "ms"))
-    with pytest.raises(ValueError, match="margin is -1, a number of at least 0"):
+    with pytest.raises(ValueError, match="margin is -1, but a number of at least 0"):
         d2.suggest(run, td=64, margin="-1ms")
     no_time: Any = "1ms"
-    with pytest.raises(TypeError, match="tolerance is '1ms', a number was expected"):
+    with pytest.raises(
+        TypeError, match="tolerance is '1ms', but a number was expected"
+    ):
         d2.suggest(run, td=64, tolerance=no_time)
-    with pytest.raises(TypeError, match="td is '64mm', a number was expected"):
+    with pytest.raises(TypeError, match="td is '64mm', but a number was expected"):
         d2.suggest(run, td="64mm")
 
 

@@ -8,6 +8,10 @@ above 0.3, no pair with a stated residual below 1 has R above 1, and 95 % of the
 
 from __future__ import annotations
 
+import os
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 import argparse
 import sys
 import time

@@ -124,7 +124,8 @@ def test_a_mean_energy_that_is_another_one_is_an_objection() -> None:
     assert not verdict["verified"]
     (reason,) = verdict["switched"]["objections"]
     assert (
-        f"{share:.0%} of that of the reference run, 70% to 130% were expected" in reason
+        f"{share:.0%} of that of the reference run, but 70% to 130% were expected"
+        in reason
     )
     assert verify_rollover("--min-mean-energy", "0.6")["verified"]
 

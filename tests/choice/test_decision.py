@@ -49,11 +49,14 @@ def test_all_commands_give_one_verdict_on_a_pair(
 @pytest.mark.parametrize(
     ("bounds", "says"),
     [
-        ((0.33, 0.34), "it will refuse that run by its mean energy; to accept it"),
-        ((1.4, 7.1), "it will refuse that run by its mean energy)"),
+        (
+            (0.33, 0.34),
+            "it will reject the run because of its mean energy; to accept it",
+        ),
+        ((1.4, 7.1), "it will reject the run because of its mean energy)"),
         (
             (0.58, 7.1),
-            "(d2rpick verify accepts 70% to 130% of a switched run, so only the comparison shows",
+            "(d2rpick verify accepts a switched run with 70% to 130%; only the comparison shows",
         ),
         ((0.8, 1.2), "mean energy after td 80% to 120% of the reference run"),
     ],

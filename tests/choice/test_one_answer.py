@@ -271,15 +271,15 @@ def test_a_card_says_the_same_of_a_pair_whoever_prints_it(tmp_path: Path) -> Non
     of_card = run("card", *body, "--tr", tr, "--td", td, "--history", str(file)).stdout
     page = tmp_path / "page.html"
     run("verify", *body, "--tr", tr, "--td", td, "--report", str(page), str(file))
-    judged = of_card[of_card.index("Judged by") :]
+    judged = of_card[of_card.index("Verdict according to") :]
     assert "hourglass: " in judged
-    assert of_suggest[of_suggest.index("Judged by") :] == judged
+    assert of_suggest[of_suggest.index("Verdict according to") :] == judged
     assert judged.splitlines()[0] in unescape(page.read_text("utf-8"))
     assert (
         "hourglass: "
         in unescape(page.read_text("utf-8"))
         .partition("/RUN/")[0]
-        .rpartition("Judged by")[2]
+        .rpartition("Verdict according to")[2]
     )
 
 

@@ -292,7 +292,7 @@ def test_every_format_tells_the_same(matsum: Path) -> None:
     table = run("info", str(matsum)).stdout
     assert "states             1501" in table
     assert table.startswith(
-        "record  can be used to choose times: it has flights, and d2rpick plan judges the windows in them\n"
+        "record  suitable for choosing times: it contains flights (d2rpick plan judges the windows in them)\n"
         "why     1 free flight; the longest lasts 0.15"
     )
     assert (

@@ -46,7 +46,7 @@ def test_a_pair_that_gives_back_more_than_there_is_is_refused_by_all_that_judge_
     (why,) = (
         remark.message for remark in answer.cautions if remark.code == "no-candidate"
     )
-    assert "times that of the reference run, at most 1.2 was expected" in why
+    assert "times that of the reference run, but at most 1.2 was expected" in why
     crossing = next(
         remark
         for remark in answer.candidates

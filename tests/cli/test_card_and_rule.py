@@ -67,8 +67,9 @@ def test_options_of_the_card() -> None:
 def test_the_times_are_judged_as_they_are_printed() -> None:
     good = run("card", *GOOD, "--part", "1", "--history", ENERGY)
     assert good.exit_code == 0
-    assert f"Judged by {ENERGY}, internal_energy: use. The flight is" in join_comments(
-        good.stdout
+    assert (
+        f"Verdict according to {ENERGY} (internal_energy): use. The flight is"
+        in join_comments(good.stdout)
     )
     alone = run(
         "card",
@@ -366,7 +367,7 @@ def test_several_windows_are_one_card() -> None:
     assert (
         join_comments(
             run("card", *two, "--part", "1", "--history", ENERGY).stdout
-        ).count("Judged by")
+        ).count("Verdict according to")
         == 2
     )
 

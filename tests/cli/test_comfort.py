@@ -417,14 +417,17 @@ def test_the_check_takes_its_history_and_what_fails_it_from_the_settings(
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("margn = 1", "unknown key 'margn' (did you mean 'margin'?), one of "),
+        ("margn = 1", "unknown key 'margn' (did you mean 'margin'?), but one of "),
         ("margn = 1", " (did you mean 'margin'?)"),
         ("[tool.d2rpick.sugest]\nmargin = 1", "unknown key 'sugest'"),
         ("[tool.d2rpick.suggest]\ndone = 'x'", "suggest: unknown key 'done'"),
-        ("margin = -1", "margin: -1 was found, a number of at least 0 was expected"),
-        ("margin = [1]", "margin is [1], a number or a text was expected"),
-        ("no-verify = 1", "no-verify is 1, true or false was expected"),
-        ("tolerance = true", "tolerance is true, a number or a text was expected"),
+        (
+            "margin = -1",
+            "margin: -1 was found, but a number of at least 0 was expected",
+        ),
+        ("margin = [1]", "margin is [1], but a number or a text was expected"),
+        ("no-verify = 1", "no-verify is 1, but true or false was expected"),
+        ("tolerance = true", "tolerance is true, but a number or a text was expected"),
         ("fit-window = [1]", "fit-window: "),
     ],
 )

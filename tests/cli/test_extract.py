@@ -307,9 +307,12 @@ def test_a_channel_of_an_unusual_name_is_named(tmp_path: Path) -> None:
         (("kinetic_energy=E9",), "no column 'E9'; there are: 1 'time', 2 'IE'"),
         (
             ("E2",),
-            "--channel E2=: QUANTITY=NAME was expected, with one of kinetic_energy,",
+            "--channel E2: QUANTITY=NAME was expected, such as kinetic_energy=NAME",
         ),
-        (("spin=E2",), "unknown quantity 'spin', one of kinetic_energy, total_energy"),
+        (
+            ("spin=E2",),
+            "unknown quantity 'spin', but one of kinetic_energy, total_energy",
+        ),
         (("mass=E2", "mass=M1"), "--channel names a quantity twice"),
     ],
 )

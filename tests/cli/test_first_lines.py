@@ -60,7 +60,7 @@ def test_parts_without_a_deck_are_unknown_and_the_deck_is_the_cure() -> None:
 def test_a_run_without_an_energy_balance_has_an_unknown_health() -> None:
     text = join_lines(run("info", MATSUM).stdout)
     assert text.startswith(
-        "record can be used to choose times: it has flights, and d2rpick plan judges the windows in them "
+        "record suitable for choosing times: it contains flights (d2rpick plan judges the windows in them) "
         "why 1 free flight"
     )
     assert "the health of the run is unknown" in text

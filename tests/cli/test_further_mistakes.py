@@ -68,11 +68,11 @@ SWITCHING = str(ROOT / "sample_data" / "switching.k")
         ),
         (
             ("suggest", "--limit", "x", ENERGY),
-            "x was found, a whole number of at least 1 was expected",
+            "x was found, but a whole number of at least 1 was expected",
         ),
         (
             ("suggest", "--limit", "0", ENERGY),
-            "0 was found, a whole number of at least 1 was expected",
+            "0 was found, but a whole number of at least 1 was expected",
         ),
         (
             ("plan", MATSUM, ENERGY),
@@ -140,9 +140,7 @@ def test_a_history_in_place_of_a_deck_is_named_with_its_option(
     name: str, title: str
 ) -> None:
     history = str(SAMPLES / name)
-    wrong = (
-        f"{name}: this is {title}, a deck was expected; give the main deck of the run"
-    )
+    wrong = f"{name}: this is {title}, but a deck was expected; give the main deck of the run"
     times = ("--tr", "0.1", "--td", "0.2", "--part", "1")
     for arguments, place in (
         (("check", history), ", and this file as --history"),
@@ -184,7 +182,7 @@ def test_an_energy_of_zero_is_the_reason_why_no_flight_is_found(tmp_path: Path) 
 
 def test_parts_of_a_table_asks_for_a_history_with_parts() -> None:
     answer = run("parts", ENERGY).stdout
-    assert answer.startswith("make rigid  unknown: this history does not contain")
+    assert answer.startswith("make rigid  unknown: the history contains no data")
     step = next(line for line in answer.splitlines() if line.startswith("next"))
     assert "d2rpick plan" in step
 
@@ -232,8 +230,9 @@ def test_no_flight_is_assumed_across_a_missing_restart_segment() -> None:
     legs = [locate_stored(f"rollover_r100_T0{leg}.gz") for leg in (1, 3)]
     first_screen = " ".join(run("info", *legs).stdout.split())
     assert first_screen.startswith(
-        "record can be used with care to choose times: it has flights, and d2rpick plan judges the windows in them "
-        "why there are no states from 0.0999564 to 0.370008: a restart segment may be missing, and no flight is assumed"
+        "record suitable with care for choosing times: it contains flights (d2rpick plan judges the windows in "
+        "them) why there "
+        "are no states from 0.0999564 to 0.370008: a restart segment may be missing, and no flight is assumed"
     )
     flights = run_json("info", *legs)["flights"]
     assert [flight["start"] > 0.37 for flight in flights] == [True]

@@ -417,7 +417,7 @@ def test_the_bounds_themselves_are_kept(tmp_path: Path) -> None:
     result = run("info", ENERGY, env={"D2RPICK_MAX_LINE": "long"})
     assert (
         result.stderr
-        == "d2rpick: D2RPICK_MAX_LINE is 'long', a number above 0 was expected; correct it or leave it out\n"
+        == "d2rpick: D2RPICK_MAX_LINE is 'long', but a number above 0 was expected; correct it or leave it out\n"
     )
 
 
@@ -455,7 +455,7 @@ def test_links_in_a_circle_give_each_run_once() -> None:
 def test_a_deck_is_called_a_deck() -> None:
     result = run("info", "sample_data/switching.k")
     assert (
-        "sample_data/switching.k: this is a deck, an energy history was expected"
+        "sample_data/switching.k: this is a deck, but an energy history was expected"
         in result.stderr
     )
 

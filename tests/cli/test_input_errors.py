@@ -25,7 +25,7 @@ TABLES: Final = {
 COMMANDS: Final = {
     "no such file": ("info", "absent.csv"),
     "no glstat, matsum, binout, d3plot or T01 in this folder": ("plan", "empty"),
-    "this is a deck, an energy history was expected": ("plan", BOX_DECK),
+    "this is a deck, but an energy history was expected": ("plan", BOX_DECK),
     "binary data of no known format": ("plan", "random"),
     "this is a zip archive": ("plan", "archive.zip"),
     "do all files belong to the same run?": ("plan", MATSUM, GLSTAT),

@@ -27,14 +27,14 @@ DECK_OF_ANOTHER_MODEL = (
         (f"suggest --td 0.2 {ENERGY}", "0 to 0.15; give a time within it"),
         (f"suggest --td 64 {ENERGY}", "give --td 0.064"),
         (f"suggest --td -0.01 {ENERGY}", "; give a time within it"),
-        (f"calibrate {DECK}", "a file, the folder of one run was expected"),
+        (f"calibrate {DECK}", "a file, but the folder of one run was expected"),
         (
             f"verify --switched {ENERGY} {ENERGY}",
             "both runs have the same energies",
         ),
         (
             "card --tr 0.07 --td 0.06 --part 1",
-            "0 <= tr < td was expected; give the earlier time as tr",
+            "tr < td was expected; give the earlier time as tr",
         ),
         ("card --tr 0,0135 --td 0.2 --part 1", "write it with a decimal point, 0.0135"),
         (f"suggest --part bx {MATSUM}", "did you mean 'box'?"),
@@ -86,7 +86,9 @@ def test_a_line_of_a_window_names_what_was_expected(tmp_path: Path) -> None:
     done = tmp_path / "done.txt"
     done.write_text("0.1\n")
     message = read_refusal("plan", "--done", str(done), MATSUM)
-    assert "done.txt:1: '0.1' was found, two numbers 'tr td' were expected" in message
+    assert (
+        "done.txt:1: '0.1' was found, but two numbers 'tr td' were expected" in message
+    )
 
 
 @pytest.mark.parametrize(
@@ -101,7 +103,7 @@ def test_a_line_of_a_window_names_what_was_expected(tmp_path: Path) -> None:
         ),
         (
             "time,internal_energy\n0,1\n1,2\n",
-            "2 states were found, at least 3 were expected; write the energies more often",
+            "2 states were found, but at least 3 were expected; write the energies more often",
         ),
         (
             "time,internal_energy\n" + "".join(f"{i},{i * i}\n" for i in range(200)),

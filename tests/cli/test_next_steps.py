@@ -114,7 +114,7 @@ def test_info_refuses_files_whose_flight_lasts_longer_than_the_energy() -> None:
         ),
         (
             ("parts", "--deck", str(SAMPLES / "oscillator"), MATSUM),
-            "cannot be read (this is a folder); check the name, and give the main deck",
+            "this is a folder; give the main deck in it",
         ),
         (
             ("verify", "--tr", "0.0687534", "--td", "0.0135867", ENERGY),
@@ -197,7 +197,7 @@ def test_info_leads_to_the_later_restart_segments_that_were_not_named() -> None:
 
 def test_without_part_energies_no_part_is_called_unable_to_be_switched() -> None:
     text = find_line("make rigid", "parts", "--deck", DECK, ENERGY)
-    assert text == "unknown: this history does not contain single parts"
+    assert text == "unknown: the history contains no data for individual parts"
 
 
 def test_a_better_pair_that_verify_refuses_is_not_offered() -> None:

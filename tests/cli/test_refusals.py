@@ -104,12 +104,12 @@ parts --tr 0.1 {MATSUM} | --tr needs --td
 parts --tr 0.3 --td 0.1 {MATSUM} | tr must lie before td
 parts --weights site.toml {MATSUM} | --weights needs --deck
 parts --deck absent.k {MATSUM} | absent.k
-parts --deck {MATSUM} {MATSUM} | this is a matsum of LS-DYNA, a deck was expected
+parts --deck {MATSUM} {MATSUM} | this is a matsum of LS-DYNA, but a deck was expected
 parts --energy 1 {MATSUM} | --energy names one energy
 parts --part 77 --deck {SAMPLE} {MATSUM} | no part 77
 parts --part recommended --deck {SAMPLE} {MATSUM} | name a set to compare
 parts --weights {SAMPLE} --deck {SAMPLE} {MATSUM} | TOML file of weights was expected
-card --part 1 --tr 0.09 --td 0.02 | 0 <= tr < td was expected
+card --part 1 --tr 0.09 --td 0.02 | tr < td was expected
 card --tr 0.01 --td 0.02 | missing: --part
 card --part 1 --td 0.02 | missing: --tr T
 card --part 1 --tr 0.02 --td 0.09 --tr 0.2 | 2 --tr and 1 --td
@@ -118,8 +118,8 @@ card --part 1 --windows absent.txt | absent.txt
 card --part 1 --tr 0.02 --td 0.09 --tr 0.05 --td 0.2 | overlaps
 card --part 1 --tr 0.2 --td 0.3 --tr 0.05 --td 0.09 | lies before
 card --part door --tr 0.01 --td 0.02 | titles need a --history
-card --part 1-99999999 --tr 0.01 --td 0.02 | is not a range
-card --part 9-3 --tr 0.01 --td 0.02 | is not a range
+card --part 1-99999999 --tr 0.01 --td 0.02 | holds more than 100000 numbers
+card --part 9-3 --tr 0.01 --td 0.02 | give the smaller number first, 3-9
 card --part 0 --tr 0.01 --td 0.02 | does not fit
 card --part 1 --node 3 --tr 0.01 --td 0.02 | --node is an option of --solver radioss
 card --solver radioss --part 1 --tr 0.01 --td 0.02 | missing: --node
@@ -187,7 +187,7 @@ rollover --tr 0.1 | give one --td for each --tr
 rollover --tr 0.2 --td 0.1 | is not before
 rollover --tr 0.1 --td 0.2 --tr 0.2 --td 0.3 | --tr 0.2 is not after --td 0.2
 rollover --tr 0.1 --td 0.2 --tr 0.3 | give one --td for each --tr
-rollover --tilt 10 | --tilt belongs to --drop
+rollover --tilt 10 | --tilt needs --drop
 rollover --scan --drop 1 | --scan and --drop exclude each other
 rollover --scan --td 0.3 --td 0.4 | takes one --td
 rollover --tr 0.2 --td 0.5 | after the end of the run
@@ -206,7 +206,7 @@ rollover --mesh 3 | 4
 rollover --scan --td 0.5 --mesh 4 | end of the flight
 rollover -o run.txt | --write-as
 # what becomes infinite, or holds no number of steps
-rollover --dt 1e308 --t-end 0.001 --mesh 4 | holds no number of steps
+rollover --dt 1e308 --t-end 0.001 --mesh 4 | is longer than the run
 rollover --stiffness 1e308 --t-end 0.001 --mesh 4 | holds no number of steps
 rollover --drop 1e308 --t-end 0.001 --mesh 4 | infinite
 rollover --speed 1e300 --t-end 0.001 --mesh 4 | infinite

@@ -196,6 +196,7 @@ def test_a_scan_gives_one_answer_in_every_form(tmp_path: Path) -> None:
     ] == document["runs"]
     assert write("rollover", "markdown", scanned, DisplayOptions()).startswith("| tr |")
     text = write("rollover", "table", scanned, DisplayOptions())
+    assert "next contact: none before the end of the run\n" in text
     assert "\n* " in text
     assert f"recommended  tr = {document['recommended']:.6g}" in text
 

@@ -165,14 +165,14 @@ def test_a_shared_key_takes_or_refuses_a_value_of_any_type(key: str) -> None:
 @pytest.mark.parametrize(
     ("line", "message"),
     [
-        ("td = 1979-05-27", "td is 1979-05-27, a number or a text was expected"),
-        ("td-window = '12'", "td-window is '12', a list was expected"),
-        ("limit = 1.5", "limit is 1.5, a whole number was expected"),
-        ("weights = 3", "weights is 3, a text was expected"),
-        ("energy = [true]", "energy is [True], a number or a text was expected"),
+        ("td = 1979-05-27", "td is 1979-05-27, but a number or a text was expected"),
+        ("td-window = '12'", "td-window is '12', but a list was expected"),
+        ("limit = 1.5", "limit is 1.5, but a whole number was expected"),
+        ("weights = 3", "weights is 3, but a text was expected"),
+        ("energy = [true]", "energy is [True], but a number or a text was expected"),
         (
             f"margin = {'9' * 99}",
-            f"margin is {'9' * 60} ..., a number or a text was expected",
+            f"margin is {'9' * 60} ..., but a number or a text was expected",
         ),
     ],
 )
@@ -194,7 +194,7 @@ def test_a_key_of_any_length_is_named_in_a_short_message() -> None:
 @pytest.mark.usefixtures("here")
 def test_a_command_is_set_by_a_table() -> None:
     put(Path("d2rpick.toml"), "suggest = 1979-05-27\n")
-    assert "suggest is 1979-05-27, a table was expected" in read_refusal(*ASKED)
+    assert "suggest is 1979-05-27, but a table was expected" in read_refusal(*ASKED)
 
 
 @pytest.mark.usefixtures("here")

@@ -75,7 +75,7 @@ def test_the_verdict_stands_at_the_head_of_a_card() -> None:
     lines = run("card", *TIMES, "--part", "1", "--history", ENERGY).stdout.splitlines()
     # The path of the history decides where the lines are wrapped.
     head = " ".join(line.removeprefix("$").strip() for line in lines[1:4])
-    assert head.startswith("Judged by")
+    assert head.startswith("Verdict according to")
     assert "internal_energy: use" in head
 
 
@@ -178,7 +178,9 @@ def test_a_pair_whose_comparison_may_fail_says_so(question: tuple[str, ...]) -> 
     low, high = answer["mean_energy_low"], answer["mean_energy_high"]
     assert answer["verdict"] == "use with care"
     assert not 0.7 <= low <= high <= 1.3
-    assert "verify accepts 70% to 130% of a switched run" in answer["expected_after_td"]
+    assert (
+        "verify accepts a switched run with 70% to 130%" in answer["expected_after_td"]
+    )
     assert answer["vibration_alone"] == "poor"
     assert answer["verdict_reason"].endswith(": use only the motion")
 
@@ -268,7 +270,7 @@ def test_a_record_of_one_state_is_too_short_for_a_flight(tmp_path: Path) -> None
     table = tmp_path / "short.csv"
     table.write_text("time,internal_energy,kinetic_energy\n0,1,2\n")
     text = join_wrapped_lines(run("info", str(table)).stdout)
-    assert "why the files contain 1 state, at least 3 were expected" in text
+    assert "why the files contain 1 state, but at least 3 were expected" in text
 
 
 def test_a_card_of_parts_that_may_share_nodes_says_how_to_merge_them() -> None:

@@ -433,11 +433,13 @@ def test_a_figure_of_runs_that_were_kept_without_outline_reads_them_again(
     assert Path(figure).read_bytes() == first
 
 
-@pytest.mark.parametrize("option", ["-o", "--plot", "--report"])
+@pytest.mark.parametrize(
+    ("option", "suffix"), [("-o", "svg"), ("--plot", "svg"), ("--report", "html")]
+)
 def test_a_ledger_is_never_replaced_by_a_result(
-    runs: list[str], tmp_path: Path, option: str
+    runs: list[str], tmp_path: Path, option: str, suffix: str
 ) -> None:
-    name = str(tmp_path / "file.svg")
+    name = str(tmp_path / f"file.{suffix}")
     assert "are the same file" in read_refusal(
         *STUDY, *runs, "--resume", name, option, name, "--overwrite"
     )
@@ -460,17 +462,18 @@ def test_a_ledger_is_not_the_standard_output(runs: list[str], tmp_path: Path) ->
 # Files.
 
 
-@pytest.mark.parametrize("option", ["-o", "--plot", "--report"])
+@pytest.mark.parametrize(
+    ("option", "suffix"), [("-o", "svg"), ("--plot", "svg"), ("--report", "html")]
+)
 def test_a_file_in_the_folder_of_a_run_is_never_written_to(
-    tmp_path: Path, option: str
+    tmp_path: Path, option: str, suffix: str
 ) -> None:
     # A database is recognised by its content; its name would not fit a plot.
-    (tmp_path / "binout0.svg").symlink_to(tmp_path / "glstat")
+    file = tmp_path / f"binout0.{suffix}"
+    file.symlink_to(tmp_path / "glstat")
     (tmp_path / "glstat").write_bytes(Path(GLSTAT).read_bytes())
     content_before = (tmp_path / "glstat").read_bytes()
-    result = run(
-        *STUDY, str(tmp_path), option, str(tmp_path / "binout0.svg"), "--overwrite"
-    )
+    result = run(*STUDY, str(tmp_path), option, str(file), "--overwrite")
     assert (result.exit_code, "this is an input" in result.stderr) == (2, True)
     assert (tmp_path / "glstat").read_bytes() == content_before
 

@@ -92,7 +92,7 @@ def test_limits_hold_for_a_time_with_its_unit(tmp_path: Path) -> None:
     name = written_in(tmp_path, "ms")
     line = read_refusal("suggest", "--td", "64ms", "--margin=-1ms", name)
     assert "--margin" in line
-    assert "-1.0 was found, a number of at least 0 was expected" in line
+    assert "-1.0 was found, but a number of at least 0 was expected" in line
 
 
 @pytest.mark.parametrize(

@@ -62,6 +62,17 @@ def test_a_deck_in_long_format_gets_cards_that_are_not(tmp_path: Path) -> None:
     ]
 
 
+def test_part_sets_in_a_deck_in_long_format_keep_their_columns(tmp_path: Path) -> None:
+    parts = range(1, 15)  # more than ten: the card names part sets
+    rows = "".join(f"*PART\ndoor\n{part:20d}{1:20d}{1:20d}\n" for part in parts)
+    card = print_cards(WINDOWS[:1], Printing(part=tuple(parts), merge=1))
+    deck = write(tmp_path, f"*KEYWORD LONG=Y\n{rows}{END}")
+    written, _ = write_deck(deck, card, str(tmp_path / "next"))
+    checked = check_deck(written)
+    assert "D2R002" not in {finding.rule for finding in checked.findings}
+    assert {window.unit.id for window in checked.windows} >= {*parts}
+
+
 def test_included_files_go_with_the_deck(tmp_path: Path) -> None:
     main = write(
         tmp_path, HEAD + "*INCLUDE\nparts/all.k\n" + END, {"parts/all.k": PARTS}

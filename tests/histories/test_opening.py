@@ -80,7 +80,7 @@ def test_content_decides_and_not_the_name(file: Write, data: bytes, name: str) -
 )
 def test_a_deck_is_told_behind_comments(file: Write, head: bytes) -> None:
     with pytest.raises(
-        FormatError, match="this is a deck, an energy history was expected"
+        FormatError, match="this is a deck, but an energy history was expected"
     ):
         read_history([file(head + b"1,2\n")])
 
@@ -396,7 +396,9 @@ def test_files_without_a_common_part_are_not_joined(
     for name, part, start in zip(names, (1, 2), (0, 2), strict=True):
         content = make_t01(4, [MadePart(part, "box")], start=start)
         Path(name).write_bytes(content.data)
-    with pytest.raises(FormatError, match="have no part in common, restart segments"):
+    with pytest.raises(
+        FormatError, match="have no part in common, but restart segments"
+    ):
         open_run([names[i] for i in order])
 
 

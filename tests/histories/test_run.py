@@ -204,7 +204,7 @@ def test_companions_of_other_times_are_doubted() -> None:
     )
     with pytest.raises(
         FormatError,
-        match="glstat and matsum have no time in common, files of one run were expected",
+        match="glstat and matsum have no time in common, but files of one run were expected",
     ):
         open_companions(
             {
@@ -292,7 +292,7 @@ def test_without_it_all_parts_are_added_with_a_note() -> None:
     assert history.energy.tolist() == TIMES.tolist()
     assert history.notes == (
         "without any internal energy: part 3 'Part 3'; rigid, or without elements?",
-        "the energies of all parts were added, those that stay deformable among them; choose with `parts`",
+        "the energies of all parts were added, including parts that stay deformable; choose with `parts`",
     )
 
 

@@ -42,7 +42,7 @@ def refuse(file: str, *parts: str) -> str:
         ("1e9", "is 1e+09 in the single state at 0.05, at most 282.6 (the largest"),
         ("1e4", "is 10000 in the single state at 0.05, at most 282.6 (the largest"),
         ("300", "is 300 in the single state at 0.05, at most 282.6 (the largest"),
-        ("-500", "is -500 in the single state at 0.05, at least 0 was expected"),
+        ("-500", "is -500 in the single state at 0.05, but at least 0 was expected"),
     ],
 )
 def test_a_damaged_energy_of_a_table_is_named_with_its_line(

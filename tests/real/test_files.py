@@ -34,10 +34,10 @@ REFUSED = {
 
 # Tables among the files next to them, and the note on each.
 MORE = {
-    "FV_crashworthiness__DRI-OLD_LSDYNA-z_many.csv": "'Z-acceleration', by its name not an internal energy",
+    "FV_crashworthiness__DRI-OLD_LSDYNA-z_many.csv": "'Z-acceleration', whose name is not an internal energy",
     "FV_crashworthiness__F28_validation-plot-data.csv": r":14: time steps back from 12\.011 to 0\.967",
-    "FV_crashworthiness__ovalization_study-e=030-AT3_Floor.csv": "by its name not an internal energy",
-    "Masters-Project__Steel_Implicit-Energy_Ratio.head6": "'Energy Ratio', by its name not an internal energy",
+    "FV_crashworthiness__ovalization_study-e=030-AT3_Floor.csv": "whose name is not an internal energy",
+    "Masters-Project__Steel_Implicit-Energy_Ratio.head6": "'Energy Ratio', whose name is not an internal energy",
 }
 PAIRS = {
     "UMAT_2scale_LSDYNA__curve.txt": (
@@ -58,7 +58,7 @@ def test_read(file: str) -> None:
     expected = READABLE[file]
     energy = tuple(expected["asked"].split())
     if energy:
-        with pytest.raises(FormatError, match="by its name not an internal energy"):
+        with pytest.raises(FormatError, match="whose name is not an internal energy"):
             read_history([real(f"histories/{file}")])
     history = read_history([real(f"histories/{file}")], Selection(energy=energy))
     assert (history.channel, str(history.time.size)) == (

@@ -132,7 +132,10 @@ def test_a_run_that_is_over_when_first_seen_is_left_to_plan(
     advice = [event for event in events if event.event in ("switch", "later")]
     assert advice
     for event in advice:
-        assert event.message.startswith("advice that came during the run: ") == is_over
+        assert (
+            event.message.startswith("advice during the run, now out of date: ")
+            == is_over
+        )
 
 
 def test_a_run_that_goes_on_after_a_silence_is_not_over(folder: Path) -> None:

@@ -94,7 +94,7 @@ def test_parts_at_rest_that_fall_are_rigid_from_the_start(tmp_path: Path) -> Non
         parts=(1, 2),
     )
     assert [rigid for rigid, _ in read_leg_states(prepared.files)] == 4 * [True, False]
-    assert "in free fall from rest: rigid from 0" in prepared.notes[0]
+    assert "fall freely from rest, so they are rigid from 0" in prepared.notes[0]
     later = d2.first(
         write_radioss_run(tmp_path / "ref", CONTACT + GRAVITY),
         tmp_path / "later",
@@ -295,7 +295,7 @@ def test_what_falls_from_rest_is_rigid_from_the_start_in_ls_dyna_too(
     deck.write_text(deck.read_text().replace("*END", f"{FALLS}{velocity}*END"))
     notes = d2.first(deck, tmp_path / "next", parts="1-3", wait=0.02).notes
     assert any("if you know the end of the load" in note for note in notes) is thrown
-    assert any("In free fall from rest" in note for note in notes) is not thrown
+    assert any("fall freely from rest" in note for note in notes) is not thrown
 
 
 def test_a_file_that_is_replaced_keeps_its_mode(tmp_path: Path) -> None:

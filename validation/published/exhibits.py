@@ -159,7 +159,7 @@ def list_exhibits(solver: Tables) -> list[tuple[int, Callable[[], Exhibit]]]:
 def _make_scheme(
     name: str, title: str, section: int, figure: str, paper: str
 ) -> Exhibit:
-    return Exhibit(name, title, section, figure, paper, "Drawn anew.")
+    return Exhibit(name, title, section, figure, paper, "Redrawn.")
 
 
 def _name_pair(pair: Sequence[float]) -> str:
@@ -195,8 +195,8 @@ def _make_response_exhibit() -> Exhibit:
     return Exhibit(
         "response", "Response for several switch times", 2, "4",
         "The response y of the switched oscillator for several pairs (tr, td), over each other, against the reference.",
-        "The same curves. The pairs differ in the swing that comes back after td; while rigid, all follow the mean "
-        "motion.",
+        "The same curves. The pairs differ in the vibration that returns after td; while the parts are rigid, all "
+        "pairs follow the mean motion.",
         True, columns | {"zero_m": 0 * TIME}, panels,
     )  # fmt: skip
 

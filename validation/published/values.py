@@ -32,7 +32,7 @@ MISPRINTS: Final = (
     "(6): with its minus sign B2 must be +V0/(omega_2 (1 + beta))",
     "(14): x is missing after (1 + beta) k/M",
     "(14): F0 acts with the sign that gives x = -Delta/(1 + beta) [...], as (18) has it and (17) has not",
-    "(15)-(17): the time counts from td",
+    "(15)-(17): time is measured from td",
 )
 
 _EXACT = "matrix exponential of the first-order system, 40 digits"

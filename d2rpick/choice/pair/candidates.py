@@ -37,7 +37,7 @@ _MORE: Final = 8
 # A candidate gets a note if the upper bound of its residual exceeds the residual by more than this [-].
 MUCH_HIGHER = 0.1
 ONE_BODY = "the parts become one rigid body"
-_SAME_SWING = "on the same swing of the energy as td, which saves hardly anything"
+_SAME_SWING = "in the same half cycle as td, so it saves almost nothing"
 
 
 class Candidate(Measured, Record):
@@ -513,7 +513,7 @@ def _list_remarks(
     if measured and reach > measured["timing_tolerance"]:
         yield f"tr is known only to ±{reach:.2g}, but its timing tolerance is ±{measured['timing_tolerance']:.2g}"
     if not (measured or situation.at_rest) and reach >= situation.history.step:
-        yield "the target energy is within the sampling error of an extremum"
+        yield "the level is within the sampling error of an extremum"
 
 
 def _describe_position(worst: Off | None) -> dict[str, Any]:

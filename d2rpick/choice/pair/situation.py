@@ -387,7 +387,7 @@ def _check_times(history: History, td: float, settings: Settings) -> None:
             count = f"{history.time.size} states were"
         raise RangeError(
             f"{', '.join(history.source)}: {count} found, "
-            f"at least {FEWEST_STATES} were expected; "
+            f"but at least {FEWEST_STATES} were expected; "
             "write the energies more often, or wait until the run has written them"
         )
     history.energy_at(td, "td")
@@ -472,8 +472,8 @@ def _choose_longer_window(
     """Return the window that an oscillator describes, or a longer window that modes describe; None if there is neither.
 
     Modes can follow a drifting mean energy, so they describe longer windows than an oscillator, which cannot. Only
-    modes with a very small misfit may extend beyond the window of an oscillator, because a contact may have ended this
-    window.
+    modes that leave hardly anything or only noise may extend beyond the window of an oscillator, because a contact may
+    have ended this window.
     """
     if modes is None:
         return by_oscillator

@@ -717,7 +717,7 @@ def _describe_above_reference(means: Means | None, energy: float) -> Iterator[st
     if means:
         times = format_beyond_limit(means.ratio(energy), MOST_KEPT)
         text = f"the mean energy after td is expected to be {times} times that of the reference run"
-        yield f"{text}, at most {MOST_KEPT:g} was expected"
+        yield f"{text}, but at most {MOST_KEPT:g} was expected"
 
 
 def list_objections_to_td(situation: Situation) -> Iterator[str]:

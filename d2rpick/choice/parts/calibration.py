@@ -263,7 +263,7 @@ def read_observations(folder: str) -> tuple[Observation, ...]:
     """
     if Path(folder).is_file():
         raise DeckError(
-            f"{folder}: a file, the folder of one run was expected; give the folder that contains it"
+            f"{folder}: this is a file, but the folder of one run was expected; give the folder that contains it"
         )
     if not Path(folder).exists():
         raise DeckError(
@@ -274,7 +274,7 @@ def read_observations(folder: str) -> tuple[Observation, ...]:
     )
     if len(decks) != 1:
         raise DeckError(
-            f"{folder}: {len(decks)} main decks were found, exactly one was expected; give the folder of one run"
+            f"{folder}: {len(decks)} main decks were found, but exactly one was expected; give the folder of one run"
         )
     observations = tuple(
         _read_radioss_observations(decks[0])

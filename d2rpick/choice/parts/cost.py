@@ -71,7 +71,7 @@ class Weights:
             )
         if not 0 < self.element_share <= 1:
             raise ConfigurationError(
-                f"element_share is {self.element_share:g}, a number above 0 and up to 1 was expected"
+                f"element_share is {self.element_share:g}, but a number above 0 and up to 1 was expected"
             )
         _check_weight("rigid_node", self.rigid_node)
 
@@ -103,7 +103,7 @@ def _check_weight(name: str, value: float) -> None:
     """Raise ConfigurationError if a cost is negative or too large."""
     if not 0 <= value <= _LARGEST:
         raise ConfigurationError(
-            f"{name} is {value:g}, a number of at least 0 and at most {_LARGEST:g} was expected"
+            f"{name} is {value:g}, but a number of at least 0 and at most {_LARGEST:g} was expected"
         )
 
 
@@ -297,7 +297,7 @@ def read_weights(path: str) -> Weights:
         reason = getattr(error, "strerror", None) or error
         reason = "binary data" if is_binary else reason
         raise ConfigurationError(
-            f"{path}: cannot be read ({reason}), a TOML file of weights was expected; d2rpick calibrate writes one"
+            f"{path}: cannot be read ({reason}), but a TOML file of weights was expected; d2rpick calibrate writes one"
         ) from None
     unknown = [key for key in values if key not in _KEYS]
     if unknown:
@@ -307,7 +307,7 @@ def read_weights(path: str) -> Weights:
     per_element = values.get("per_element")
     if not isinstance(per_element, dict) or not per_element:
         raise ConfigurationError(
-            f"{path}: no table [per_element], the cost of each formulation was expected there"
+            f"{path}: no table [per_element], but the cost of each formulation was expected there"
         )
     numbers: dict[str, Any] = {
         key: _parse_weight(path, key, values[key]) for key in _NUMBERS if key in values
@@ -361,7 +361,9 @@ def _quote_for_toml(text: str) -> str:
 def _parse_weight(path: str, name: str, value: object) -> float:
     """Return a value of a TOML file as a number, or raise ConfigurationError."""
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ConfigurationError(f"{path}: {name} is {value!r}, a number was expected")
+        raise ConfigurationError(
+            f"{path}: {name} is {value!r}, but a number was expected"
+        )
     try:
         return float(value)
     # The integer has hundreds of digits and is too large for a float.

@@ -53,6 +53,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.parts.cost import CostModel, Share, Weights
     from d2rpick.choice.question import Settings
     from d2rpick.deck.model import Inventory
+    from d2rpick.histories.history import History
     from d2rpick.histories.run import OpenedRun
 
 # Savings that differ by at most this are treated as equal [-], because the cost model is accurate to a few percent.
@@ -187,7 +188,10 @@ def compare_sets_of_parts(
     )
     comparison = _SetComparison(run, settings, model, rows)
     sets: list[PartSet] = []
-    for part_set in _list_sets(rows, given_ids):
+    listed_sets = [*_list_sets(rows, given_ids)]
+    if times is not None and listed_sets:
+        _check_times(comparison.open_reference(listed_sets[0]).history, times)
+    for part_set in listed_sets:
         # All sets get the same td so that they can be compared.
         td = next((earlier.window[1] for earlier in sets if earlier.window), None)
         sets.append(comparison.of(part_set, times or td))
@@ -388,6 +392,10 @@ class _SetComparison:
         )
         return frozenset() if inventory.ties else frozenset(parts) - {*main}
 
+    def open_reference(self, part_set: PartSet) -> Reference:
+        """Return the reference run of a set of parts."""
+        return Reference.of(self.run, Selection(parts=tuple(map(str, part_set.parts))))
+
     def _with_window(self, part_set: PartSet, times: Times | float | None) -> PartSet:
         """Add the window during which the parts of a set may be rigid.
 
@@ -396,9 +404,7 @@ class _SetComparison:
         RangeError
             If no tr can be recommended, with the reason.
         """
-        reference = Reference.of(
-            self.run, Selection(parts=tuple(map(str, part_set.parts)))
-        )
+        reference = self.open_reference(part_set)
         bodies = (
             find_rigid_bodies(self.model.inventory, part_set.parts)
             if self.model
@@ -429,6 +435,17 @@ class _SetComparison:
             decision=decision,
         )
         return _add_position_error(part_set, situation, tr)
+
+
+def _check_times(history: History, times: Times | float) -> None:
+    """Raise RangeError if a given time lies outside the record."""
+    if not isinstance(times, tuple):
+        history.check(times, argument="td")
+        return
+    tr, td = times
+    history.check_pair(tr, td)
+    history.check(tr, argument="tr")
+    history.check(td, argument="td")
 
 
 def _add_position_error(part_set: PartSet, situation: Situation, tr: float) -> PartSet:

@@ -67,6 +67,8 @@ _ROUNDED: Final = 0.001
 _NOT_REPEATED = ("no-candidate",)
 # A record is complete if it ends no earlier than this fraction of the median end time of all runs [-].
 _WHOLE: Final = 0.99
+# Largest difference of two times that are taken as equal but for their unit, relative to the times [-].
+_SAME_TIME: Final = 0.02
 # Number of intervals into which a curve is divided; only the lowest and highest energy of each interval are drawn.
 _STRETCHES = 200
 
@@ -387,8 +389,43 @@ def find_cut_runs(rows: Sequence[StudyRow]) -> list[StudyRow]:
     return [
         row
         for row, end in read_to
-        if end < _WHOLE * whole or "truncated-input" in row.warnings
+        if (end < _WHOLE * whole and not _find_unit_ratio(end, whole))
+        or "truncated-input" in row.warnings
     ]
+
+
+def describe_other_unit(rows: Sequence[StudyRow]) -> str:
+    """Return that the times of some runs are 1000 or 1,000,000 times those of others; empty if none are."""
+    ended = [row for row in rows if row.record_end and row.tr]
+    for row in ended:
+        first = ended[0]
+        ratio = _find_unit_ratio(first.record_end or 0.0, row.record_end or 0.0)
+        if ratio and ratio == _find_unit_ratio(first.tr or 0.0, row.tr or 0.0):
+            return _compare_units(row, first, ratio)
+        ratio = _find_unit_ratio(row.record_end or 0.0, first.record_end or 0.0)
+        if ratio and ratio == _find_unit_ratio(row.tr or 0.0, first.tr or 0.0):
+            return _compare_units(first, row, ratio)
+    return ""
+
+
+def _compare_units(later: StudyRow, earlier: StudyRow, ratio: float) -> str:
+    """Return that the times of two runs seem to have different units."""
+    return (
+        f"the times of {later.source} are {ratio:g} times those of {earlier.source}, so they seem to be in another "
+        "unit; convert the runs to one unit of time"
+    )
+
+
+def _find_unit_ratio(time: float, later: float) -> float:
+    """Return 1000 or 1,000,000 if ``later`` is about this multiple of ``time``; 0 otherwise."""
+    return next(
+        (
+            size
+            for size in (1e3, 1e6)
+            if abs(later - size * time) <= _SAME_TIME * size * time
+        ),
+        0.0,
+    )
 
 
 def describe_end_of_record(row: StudyRow) -> str:
@@ -442,6 +479,8 @@ def _warn_about_runs(rows: Sequence[StudyRow], common: Common) -> Iterator[Cauti
         "the runs have different units of time, but td has only one",
         [row.time_unit for row in judged],
     )
+    if in_other_unit := describe_other_unit(judged):
+        yield Caution("mixed-units", in_other_unit)
     yield from _warn_about_difference(
         "mixed-bases",
         "the basis of the choice differs between the runs",
@@ -477,10 +516,12 @@ def _warn_about_unusual_files(rows: Sequence[StudyRow]) -> Iterator[Caution]:
         text = (
             f"{len(left_out)} of {format_number_of_runs(len(rows))} could not be judged"
         )
-        yield Caution(
-            "runs-left-out",
-            f"{text} and are left out: {list_names(left_out, most=NAMED)}",
-        )
+        first = next(row for row in rows if not row.judged)
+        if len(left_out) == 1:
+            which = f"is left out: {explain_left_out(first)}"
+        else:
+            which = f"are left out: {list_names(left_out, most=NAMED)}; the first: {explain_left_out(first)}"
+        yield Caution("runs-left-out", f"{text} and {which}")
     cut = [
         f"{row.source} ({describe_end_of_record(row)})" for row in find_cut_runs(rows)
     ]
@@ -490,6 +531,12 @@ def _warn_about_unusual_files(rows: Sequence[StudyRow]) -> Iterator[Caution]:
             "cut-runs",
             f"{count} were cut, or end earlier than most: {list_names(cut, most=NAMED)}",
         )
+
+
+def explain_left_out(row: StudyRow) -> str:
+    """Return why a run could not be judged, with the name of the run once."""
+    message = row.message or row.status
+    return message if row.source in message else f"{row.source}: {message}"
 
 
 def _name_parts(row: StudyRow) -> str:
@@ -616,6 +663,8 @@ def _explain_why_apart(judged: Sequence[StudyRow], unsuited: str) -> str:
     without = [row.source for row in judged if not row.acceptable.size]
     if without:
         return f"no tr at all is admissible in {list_names(without, most=NAMED)}"
+    if in_other_unit := describe_other_unit(judged):
+        return in_other_unit
     apart = next(row for row in judged if row.source == unsuited)
     for row in judged:
         if not find_common_windows([apart.acceptable, row.acceptable]).size:

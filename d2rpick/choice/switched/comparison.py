@@ -469,7 +469,7 @@ def _check_mean_energy(share: float, min_mean: float) -> Iterator[str]:
         mean_text = (
             f"the mean energy after td is {share:.0%} of that of the reference run"
         )
-        yield f"{mean_text}, {100 * min_mean:g}% to {100 * (2 - min_mean):g}% were expected (`min_mean_energy`)"
+        yield f"{mean_text}, but {100 * min_mean:g}% to {100 * (2 - min_mean):g}% were expected (`min_mean_energy`)"
 
 
 def _check_momentum(error: float | None) -> Iterator[str]:

@@ -120,7 +120,9 @@ def find_time_column(
     quantity nor row numbers.
     """
     if wanted is not None:
-        return find_column(source, layout, wanted), []
+        column = find_column(source, layout, wanted)
+        _refuse_other_quantity_as_time(source, layout, column)
+        return column, []
     times = [
         i for i, column in enumerate(layout.names[: layout.trusted]) if is_time(column)
     ]
@@ -156,6 +158,20 @@ def find_time_column(
     ]
 
 
+def _refuse_other_quantity_as_time(source: str, layout: Layout, column: int) -> None:
+    """Raise FormatError if a column that the user chose as the time has the name of another quantity."""
+    name = layout.name(column)
+    meaning = None if is_time(name) else find_meaning(name)
+    if meaning is None:
+        return
+    times = [i for i, title in enumerate(layout.names) if is_time(title)]
+    menu = _list_columns(layout, times or range(layout.columns))
+    quantity = meaning.quantity.replace("_", " ")
+    raise FormatError(
+        f"{source}: column {column + 1} {name!r} is by its name not a time ({quantity}); choose with `time`: {menu}"
+    )
+
+
 def find_internal_energy(
     source: str, layout: Layout, times: Sequence[int], numeric: frozenset[int]
 ) -> int:
@@ -175,7 +191,12 @@ def find_internal_energy(
     ]
     if len(energies) == 1:
         return energies[0]
-    count = f"{len(energies)} columns are" if energies else "no column is"
+    if energies:
+        count = f"{len(energies)} columns are"
+    elif layout.names:
+        count = "no column is"
+    else:
+        count = "the table has no line of headings, so no column is"
     choices = energies or candidates
     menu = _list_columns(layout, choices)
     raise EnergyChoiceError(

@@ -102,7 +102,7 @@ class _CurveText:
         cells = line.replace(",", " ").split()
         if len(cells) != 2 or not self.curves:
             raise FormatError(
-                f"{self.source}:{number}: {line.strip()[:60]!r}, a pair of numbers was expected"
+                f"{self.source}:{number}: {line.strip()[:60]!r}, but a pair of numbers was expected"
             )
         curve = self.curves[-1]
         curve.times.append(cells[0])
@@ -121,7 +121,7 @@ class _CurveText:
         """End the last curve; raise FormatError unless it has the announced number of pairs."""
         count = len(self.curves[-1].times)
         if count != expected:
-            problem = f"{self.source}:{number}: {count} pairs, {expected} were expected in {self.stops}"
+            problem = f"{self.source}:{number}: {count} pairs, but {expected} were expected in {self.stops}"
             raise FormatError(f"{problem}; export it again")
         self.stops = ""
 
@@ -233,7 +233,7 @@ class Curves(Database):
             line = curve.lines[bad[0]]
             cell = cells[bad[0]][:60]
             problem = (
-                f"{self.source}:{line}: {cell!r} of {name!r}, a number was expected"
+                f"{self.source}:{line}: {cell!r} of {name!r}, but a number was expected"
             )
             raise FormatError(f"{problem}; repair or delete the line")
         return numbers

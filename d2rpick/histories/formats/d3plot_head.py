@@ -79,7 +79,7 @@ def read_d3plot_head(content: Content, source: str) -> Head:
             f"{source}: this file is packed by femzip; unpack it, or name the glstat or binout of the run"
         )
     if control["nglbv"] < GLOBALS:
-        problem = f"{source}: its states have {control['nglbv']} global values, {GLOBALS} or more were expected"
+        problem = f"{source}: its states have {control['nglbv']} global values, but {GLOBALS} or more were expected"
         raise FormatError(f"{problem}; name the glstat or binout of the run")
     geometry = Geometry(words, control)
     geometry.pass_over()

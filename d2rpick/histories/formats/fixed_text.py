@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.base.errors import FormatError
+from d2rpick.base.errors import CHOOSE_FORMAT, FormatError
 from d2rpick.histories.content import count_line_number, make_content
 from d2rpick.histories.database import Database
 from d2rpick.histories.formats.blocks import (
@@ -115,8 +115,10 @@ class Blocks(Database):
     def refuse_foreign(self) -> None:
         """Raise FormatError if the file has neither a header nor a complete state."""
         if not self.version and not self.states:
-            problem = f"{self.source}:1: neither a line with 'ls-dyna' nor a whole state was found, this is not a"
-            raise FormatError(f"{problem} {self.format}; choose another input format")
+            raise FormatError(
+                f"{self.source}:1: this is not a {self.format}: neither a line with 'ls-dyna' nor a whole state was "
+                f"found; {CHOOSE_FORMAT}"
+            )
 
     def numbers(
         self, names: Sequence[Hashable], anchors: Sequence[Hashable] = ()
@@ -252,7 +254,7 @@ class Blocks(Database):
         text = self.text(address, self._grammar.width).decode("latin-1").strip()
         problem = f"{self.source}:{count_line_number(self._data, address)}: {_name_field(names[column])} is {text!r}"
         raise FormatError(
-            f"{problem}, a number in its columns was expected; cut the file before this state"
+            f"{problem}, but a number in its columns was expected; cut the file before this state"
         )
 
     def _run_of(self, state: int) -> tuple[Stretch, int]:

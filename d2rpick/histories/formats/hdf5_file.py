@@ -295,7 +295,7 @@ class PartGroup(Database):
             size for size in shape if size != 1
         ]:
             raise FormatError(
-                f"{self.source}: {dataset.name} has shape {dataset.shape}, {shape} was expected"
+                f"{self.source}: {dataset.name} has shape {dataset.shape}, but {shape} was expected"
             )
         return check_finite(dataset[()], dataset.name, self.source).reshape(shape)
 
@@ -381,7 +381,7 @@ def _choose_only_column(
     paths = [f"{column.path} ({column.size})" for column in fitting or columns]
     menu = list_names(paths, most=_MANY) or "there is none"
     raise FormatError(
-        f"{source}: {count} for {purpose}, one was expected; give its path: {menu}"
+        f"{source}: {count} for {purpose}, but one was expected; give its path: {menu}"
     )
 
 

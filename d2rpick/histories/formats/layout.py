@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 
 # Text at the start of the LS-DYNA listings d3hsp and messag.
 _LISTING_OF_LS_DYNA: Final = "Livermore Software"
+# Several words between separators, as in a line of headings.
+_SEPARATED_WORDS: Final = re.compile(r"[^\W\d][^,;\t]*([,;\t][^,;\t]+)+")
 # Pairs of a separator (None: spaces) and a decimal sign, in the order in which they are tried.
 # If the separator and the decimal sign are both commas, a row is readable only if its numbers are quoted.
 _FORMS = (
@@ -174,6 +176,11 @@ def _report_no_table(text: Text, lines: Sequence[str]) -> FormatError:
             f"{text.name}:{number}: only one column, {quote_start(line)}, was found"
         )
         cure = "add a column with the times"
+    elif len(numbered) == 1 and _SEPARATED_WORDS.match(line.strip()):
+        problem = (
+            f"{text.name}:{number}: only a line of headings was found, and no rows"
+        )
+        cure = "write rows of numbers below the headings, or give another file"
     elif _LISTING_OF_LS_DYNA in line:
         problem = f"{text.name}:{number}: this is a listing of LS-DYNA"
         cure = "give the glstat, matsum or binout of the run"
@@ -303,7 +310,7 @@ def _refuse_odd_rows(
                 f"{source}:{number}: {quote_start(line)} differs from the rows below"
             )
             raise FormatError(
-                f"{problem}, {table.columns} values were expected; repair or delete the line"
+                f"{problem}, but {table.columns} values were expected; repair or delete the line"
             )
 
 

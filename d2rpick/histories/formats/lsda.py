@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from d2rpick.base.errors import FormatError
+from d2rpick.base.errors import CHOOSE_FORMAT, FormatError
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.histories.content import Content, make_content
 from d2rpick.histories.formats.blocks import count_repetitions
@@ -432,8 +432,9 @@ def _read_lsda_header(
     """Return the offset of the first record, the byte order, and the formats of record headers and type codes."""
     header = data[:8]
     if not recognises(header):
-        problem = f"{source}: begins with {header.hex(' ')}, the header of a binout was expected"
-        raise FormatError(f"{problem}; name another file")
+        raise FormatError(
+            f"{source}: this is not a binout, because its header is missing; {CHOOSE_FORMAT}"
+        )
     begin, length, _, command, type_id, little = header[:6]
     order = "<" if little else ">"
     head = struct.Struct(order + _FIELDS[length] + _FIELDS[command])

@@ -198,7 +198,9 @@ class _Curve:
             interruption = "the time starts again after a gap"
             if self._ended:
                 interruption = "a curve continues after empty cells"
-            problem = f"{self._name}:{number}: {interruption}, one curve was expected"
+            problem = (
+                f"{self._name}:{number}: {interruption}, but one curve was expected"
+            )
             raise FormatError(
                 f"{problem}; repair the line or put each curve into its own file"
             )
@@ -246,7 +248,7 @@ def _split_row(where: str, row: str, layout: Layout) -> list[str]:
     if len(cells) != layout.columns:
         count = "1 value" if len(cells) == 1 else f"{len(cells)} values"
         raise FormatError(
-            f"{where}: {count}, {layout.columns} were expected as in the other rows; repair the line"
+            f"{where}: {count}, but {layout.columns} were expected as in the other rows; repair the line"
         )
     return cells
 
@@ -255,8 +257,6 @@ def _parse_value(where: str, layout: Layout, column: int, cell: str) -> float:
     """Return the finite number in a cell; raise FormatError for any other content."""
     value = layout.number(cell)
     if value is None or not np.isfinite(value):
-        problem = (
-            f"{where}: {layout.name(column)!r} is {cell[:60]!r}, a number was expected"
-        )
+        problem = f"{where}: {layout.name(column)!r} is {cell[:60]!r}, but a number was expected"
         raise FormatError(f"{problem}; repair or delete the line")
     return value

@@ -175,7 +175,7 @@ def _read_plain_text(source: Source, piece: int) -> tuple[Content, str]:
         data = data.decode("utf-16", errors="replace").encode()
     elif b"\0" in data:
         raise FormatError(
-            f"{source.name}: binary data, a text table was expected; export the history as CSV"
+            f"{source.name}: binary data, but a text table was expected; export the history as CSV"
         )
     data = data.removeprefix(_UTF8)
     if b"\r" in data:

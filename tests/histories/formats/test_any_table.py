@@ -228,7 +228,7 @@ def test_a_quantity_with_a_hole_is_left_out_with_its_line(hole: str) -> None:
 
 def test_a_hole_in_the_energy_is_refused_with_its_line() -> None:
     with pytest.raises(
-        FormatError, match="table:22: 'IE' is '#NV', a number was expected"
+        FormatError, match="table:22: 'IE' is '#NV', but a number was expected"
     ):
         read_table(
             lines("time,IE,KE", "{t},{e},{k}").replace(format_number(ENERGY[20]), "#NV")
@@ -267,7 +267,7 @@ def test_another_table_below_is_refused_with_both_lines() -> None:
 def test_a_damaged_row_is_refused_though_it_begins_with_a_word() -> None:
     text = lines("time,IE,KE", "{t},{e},{k}").replace("\n5.000,", "\nx.000,")
     with pytest.raises(
-        FormatError, match=r"table:22: 'time' is 'x\.000', a number was expected"
+        FormatError, match=r"table:22: 'time' is 'x\.000', but a number was expected"
     ):
         read_table(text)
 

@@ -281,5 +281,5 @@ def test_no_states_is_a_legal_file() -> None:
 )
 def test_something_else_is_not_recognised_and_refused(head: bytes) -> None:
     assert not recognises(head)
-    with pytest.raises(FormatError, match="the header of a binout was expected"):
+    with pytest.raises(FormatError, match="this is not a binout"):
         open_binout(head)

@@ -407,16 +407,19 @@ def test_columns_that_cannot_be_told(text: str, asked: list[str], reason: str) -
 @pytest.mark.parametrize(
     ("text", "reason"),
     [
-        ("time,IE\n0,1\n1,nan\n2,3\n", "table:3: 'IE' is 'nan', a number was expected"),
+        (
+            "time,IE\n0,1\n1,nan\n2,3\n",
+            "table:3: 'IE' is 'nan', but a number was expected",
+        ),
         ("time,IE,KE\n0,1,2\n1,,2\n2,3,4\n", "table:3: 'IE' is ''"),
         ("time,IE\n0,1\n1,1e999\n2,3\n", "table:3: 'IE' is '1e999'"),
         ("time,IE\n0,1\n1,1_0\n2,3\n", "table:3: 'IE' is '1_0'"),
         ("time,IE\n0,1\n\n1,*****\n2,3\n", r"table:4: 'IE' is '\*\*\*\*\*'"),
-        ("time,IE\n0,1\n1\n2,3\n", "table:3: 1 value, 2 were expected"),
-        ("time,IE\n0,1\n1,2,3\n2,3\n", "table:3: 3 values, 2 were expected"),
+        ("time,IE\n0,1\n1\n2,3\n", "table:3: 1 value, but 2 were expected"),
+        ("time,IE\n0,1\n1,2,3\n2,3\n", "table:3: 3 values, but 2 were expected"),
         ("time,IE\n0,1\nend\n1,2\n", "table:3: 1 value,"),
         ("time,IE\n0\n1,2\n2,3\n", "table:2: '0' differs from the rows below"),
-        ("time,IE\n0,-\n1,2\n2,3\n", "table:2: 'IE' is '-', a number was expected"),
+        ("time,IE\n0,-\n1,2\n2,3\n", "table:2: 'IE' is '-', but a number was expected"),
         (
             "time;IE\n0,5;1.5\n0,6;1,5\n",
             "table:2: 'IE' is '1.5'|table:2: '0,5;1.5' differs",
@@ -448,11 +451,11 @@ def test_columns_that_cannot_be_told(text: str, asked: list[str], reason: str) -
         ),
         (
             "time,ALLKE\n0,1\n1,2\n",
-            r"'ALLKE', by its name not an internal energy \(ALLKE\); choose with `energy`",
+            r"'ALLKE', whose name is not an internal energy \(ALLKE\); write the internal energy too",
         ),
         (
             "Nodal History,Z-acceleration\nTime,A8,\n0,1,\n1,2,\n",
-            "'A8: Z-acceleration', by its name",
+            "'A8: Z-acceleration', whose name",
         ),
         ("run,IE\na1,1\na2,2\n", "no rows of at least two numbers"),
         ("| a title |\n| a line |\n" * 9, "no rows of at least two numbers"),

@@ -202,12 +202,12 @@ def test_pairs_below_their_count_are_a_curve() -> None:
         (
             CURVEPLOT.replace("pts=3", "pts=4"),
             ["1"],
-            "curves:12: 3 pairs, 4 were expected in the curve 'A12'",
+            "curves:12: 3 pairs, but 4 were expected in the curve 'A12'",
         ),
         (
             CURVEPLOT.replace("-3.2500000000e+00", ""),
             ["1"],
-            "curves:10: '1.0000000000e.00', a pair of numbers was expected",
+            "curves:10: '1.0000000000e.00', but a pair of numbers was expected",
         ),
         (
             CURVEPLOT.replace("-3.2500000000e+00", "NaN"),
@@ -217,7 +217,7 @@ def test_pairs_below_their_count_are_a_curve() -> None:
         (
             T_HIS.replace("1.0 -3.25", "1.0 -3.25 7"),
             ["1"],
-            "curves:7: '1.0 -3.25 7', a pair of numbers",
+            "curves:7: '1.0 -3.25 7', but a pair of numbers",
         ),
         (
             DYNAFORM.replace("1.0, -3.25", "1.0; -3.25"),
@@ -227,9 +227,9 @@ def test_pairs_below_their_count_are_a_curve() -> None:
         (
             COUNTED.replace("3\n", "2\n"),
             [],
-            "curves:4: 3 pairs, 2 were expected in the curve 1",
+            "curves:4: 3 pairs, but 2 were expected in the curve 1",
         ),
-        ("5\n0 1\n1 2\n2\n0 1\n1 2\n", [], "curves:4: 2 pairs, 5 were expected"),
+        ("5\n0 1\n1 2\n2\n0 1\n1 2\n", [], "curves:4: 2 pairs, but 5 were expected"),
         ("1" * 5000 + "\n0 1\n1 2\n", [], "curves:1: a count of 5000 digits"),
         ("1" * 5000 + "\n1 'IE'\n0 1\n1 2\n", [], "curves:1: a count of 5000 digits"),
         (
@@ -240,12 +240,12 @@ def test_pairs_below_their_count_are_a_curve() -> None:
         (
             "3\n0 1\n1e999 2\n1e999 3\n",
             [],
-            "curves:3: '1e999' of 'curve 1', a number was expected",
+            "curves:3: '1e999' of 'curve 1', but a number was expected",
         ),
         (
             "Curveplot\nt\nTime\nEnergy Ratio\nC\nEnergy Ratio #pts=2\n0 1\n1 1\nendcurve\n",
             [],
-            "'Energy Ratio', by its name",
+            "'Energy Ratio', whose name",
         ),
         (
             "4\n0 1\n1 2\n0 3\n1 4\n",

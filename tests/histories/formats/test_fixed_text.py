@@ -134,7 +134,7 @@ def test_all_other_columns_are_read_in_one_pass_and_a_damaged_one_is_refused_alo
     assert sound.taken == once
     hurt = Glstat(damaged, "glstat", ["internal energy"])
     with pytest.raises(
-        FormatError, match=r"'external work' is '\*\.00000E\+00', a number"
+        FormatError, match=r"'external work' is '\*\.00000E\+00', but a number"
     ):
         hurt.channel("external work")
     sound_names = [name for name in hurt.channels if name != "external work"]

@@ -30,7 +30,9 @@ CONTROLLERS = (
 
 STATES = ((0.0, 2e-20), (1.5e-3, 1.36945e-5), (2.75e-3, -8.05e2))
 KILLED = "a leg that was killed, and its restart"
-NO_NUMBER = "glstat:32: 'internal energy' is '{}', a number in its columns was expected"
+NO_NUMBER = (
+    "glstat:32: 'internal energy' is '{}', but a number in its columns was expected"
+)
 NOT_ONCE = "glstat:29: 'internal energy' is missing, cut or doubled in the state that begins here"
 
 

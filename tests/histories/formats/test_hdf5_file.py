@@ -131,7 +131,9 @@ def test_matrix_of_another_shape_is_refused() -> None:
         del file["matsum/internal_energy"]
         file["matsum/internal_energy"] = PARTS.T
 
-    with pytest.raises(FormatError, match=r"has shape \(2, 4\), \(4, 2\) was expected"):
+    with pytest.raises(
+        FormatError, match=r"has shape \(2, 4\), but \(4, 2\) was expected"
+    ):
         open_saved_binout(write_hdf5(turned)).part_channel("internal_energy", [1])
 
 
@@ -423,7 +425,7 @@ def test_a_line_end_in_a_name_does_not_break_the_message() -> None:
 
 def test_the_only_column_of_another_quantity_has_to_be_asked_for() -> None:
     kinetic_file = make_file({"time": TIME, "kinetic_energy": KINETIC})
-    with pytest.raises(FormatError, match="by its name not an internal energy"):
+    with pytest.raises(FormatError, match="whose name is not an internal energy"):
         read_hdf5(kinetic_file)
     assert read_hdf5(kinetic_file, "kinetic_energy").energy.tolist() == KINETIC.tolist()
 

@@ -241,7 +241,7 @@ def test_what_is_no_number_in_all_states_is_refused_with_the_line_of_the_first()
     line = 1 + text[: text.index(b"y-mom=*")].count(b"\n")
     with pytest.raises(
         FormatError,
-        match=rf"matsum:{line}: y-mom of part 11 is '\*+', a number in its columns",
+        match=rf"matsum:{line}: y-mom of part 11 is '\*+', but a number in its columns",
     ):
         run.part_channel("y_momentum", [11, 12])
 

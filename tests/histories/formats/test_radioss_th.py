@@ -314,7 +314,9 @@ def test_a_number_out_of_its_columns_is_none(number: str, damaged: str) -> None:
 def test_a_number_that_is_none_is_refused() -> None:
     writer = make_t01(2, writer=T01TextWriter())
     writer.state(0.25, [float("nan")] * 22, [0.0] * 16)
-    with pytest.raises(D2RPickError, match="energy of state 3 is nan, a finite number"):
+    with pytest.raises(
+        D2RPickError, match="energy of state 3 is nan, but a finite number"
+    ):
         open_contents(radioss_th, bytes(writer.data)).history(Selection())
 
 
