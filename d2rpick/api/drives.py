@@ -106,14 +106,6 @@ class Driving:
             warn_about_solver(self.deck.parts, self.inventory)
         )
 
-    def refuse_other_files(self) -> None:
-        """Raise D2RPickError if the folder contains files, but no run that was begun there."""
-        folder = self.folder
-        if not folder.is_dir() or (folder / JOURNAL).exists():
-            return
-        if any(not file.name.startswith(".") for file in folder.iterdir()):
-            raise D2RPickError(f"{folder}: the folder is not empty; choose another one")
-
     @contextmanager
     def driver(self, *, resume: bool) -> Iterator[Driver]:
         """Lock the run's folder against other drivers, and yield the driver.
