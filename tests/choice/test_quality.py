@@ -585,7 +585,7 @@ def test_noise_is_not_blamed_on_the_output_interval(noise: float) -> None:
     fast = np.cos(np.pi / 5 * time / 1e-3) ** 2
     slow = np.cos(np.pi / 200 * time / 1e-3) ** 2
     random = np.random.default_rng(3).standard_normal(time.size)
-    energy = 20 + (slow + 1.5 * random if noise else fast)
+    energy = np.asarray(20 + (slow + 1.5 * random if noise else fast), dtype=np.float64)
     history = History(time, energy, source=("run",), format="csv", channel="E")
     (cause,) = list_causes_of_record(history, None, 0.5)
     if noise:

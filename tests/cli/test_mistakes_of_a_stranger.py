@@ -135,12 +135,6 @@ def test_a_lead_part_that_no_card_makes_rigid_is_named() -> None:
     )
 
 
-def test_a_release_after_the_end_of_a_replay_is_named() -> None:
-    times = ("--tr", "0.006", "--td", "0.08", "--t-end", "0.01", "--dt", "0.001")
-    answer = run("replay", *OSCILLATOR, "--v0", "6", *times)
-    assert "the result ends before the release; give a later --t-end" in answer.stderr
-
-
 def test_a_column_without_the_name_of_an_energy_gets_a_note() -> None:
     """Before, a displacement was judged as the internal energy without a word."""
     note = "'z' is not an energy by its name, but it was used; if 'internal_energy' was meant, give it as --energy"

@@ -19,7 +19,7 @@ from tests.made_t01 import MadePart, make_t01
 from tests.reading import read_history
 from tests.text_files import make_glstat_text
 
-CSV = b"first,second\n0.0,1.0\n0.1,2.0\n0.2,1.5\n"
+CSV = b"time,internal_energy\n0.0,1.0\n0.1,2.0\n0.2,1.5\n"
 GLSTAT = (
     b" title\n                         ls-dyna smp.123264 s           date 01/12/2018\n\n\n"
     b" dt of cycle       1 is controlled by dt2ms     \n\n"
@@ -177,7 +177,7 @@ def test_missing_files_and_folders_are_named(tmp_path: Path) -> None:
 
 def test_the_selection_reaches_the_reader(file: Write) -> None:
     assert read_history(
-        [file(CSV)], Selection(time="2", energy=("1",))
+        [file(b"first,second\n0.0,1.0\n0.1,1.5\n")], Selection(time="2", energy=("1",))
     ).time.tolist() == [1.0, 1.5]
     np.testing.assert_array_equal(
         read_history([file(GLSTAT)], Selection(energy=("Internal Energy",))).energy,

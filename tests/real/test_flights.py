@@ -45,8 +45,14 @@ def test_nothing_fails_at_any_td_and_no_flight_contradicts_the_health(
     ).tolist():
         try:
             answer = suggest_in_run(reference, td, PLAIN)
-        except D2RPickError:
-            assert reference.history.time.size < 3 or not reference.history.energy.any()
+        except D2RPickError as error:
+            history = reference.history
+            assert (
+                history.time.size < 3
+                or not history.energy.any()
+                # A later restart segment is refused without the earlier ones.
+                or "the start of the run is in" in str(error)
+            )
             continue
         if answer.situation.in_flight:
             assert not {"work-in-window", "contact-in-window"} & {
