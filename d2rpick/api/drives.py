@@ -159,14 +159,6 @@ class Driving:
                     f"{folder}: {error.strerror}; make room, then --resume"
                 ) from None
 
-    def refuse_other_files(self) -> None:
-        """Raise D2RPickError if the folder of the run exists and contains files, but no run that was begun."""
-        folder = self.folder
-        if not folder.is_dir() or (folder / JOURNAL).exists():
-            return
-        if any(not file.name.startswith(".") for file in folder.iterdir()):
-            raise D2RPickError(f"{folder}: the folder is not empty; choose another one")
-
     def answer(self, driver: Driver, command: Sequence[str]) -> Drive:
         """Return the result for the part of the run that has been computed."""
         legs = driver.journal.legs

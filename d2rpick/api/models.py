@@ -113,13 +113,19 @@ class Motion:
         _ = self.oscillator
         if (self.tr is None) != (self.td is None):
             raise ArgumentError("give --tr and --td together")
+<<<<<<< HEAD
         if self.tr is not None and self.td is not None and not self.tr < self.td:
             raise ArgumentError(f"--tr {self.tr:g} is not before --td {self.td:g}")
+        _check_interval(self.dt, self.t_end, MOST_REPLAYED)
+=======
+        if self.tr is not None and self.td is not None:
+            _check_windows((self.tr,), (self.td,), self.t_end)
         _check_interval(self.dt, self.t_end)
         if self.t_end / self.dt > MOST_REPLAYED:
             raise ArgumentError(
                 f"--t-end {self.t_end:g} holds more than {MOST_REPLAYED} intervals of --dt {self.dt:g}"
             )
+>>>>>>> t51b
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -247,11 +253,15 @@ class Box:
             _check_windows(self.tr, self.td, self.end)
         if self.tilt is not None and self.drop is None:
             raise ArgumentError("--tilt needs --drop: it is the tilt of a falling box")
+<<<<<<< HEAD
+        _check_interval(self.dt, self.end, MOST_STATES)
+=======
         _check_interval(self.dt, self.end)
         if self.end / self.dt > MOST_STATES:
             raise ArgumentError(
                 f"--t-end {self.end:g} holds more than {MOST_STATES} intervals of --dt {self.dt:g}"
             )
+>>>>>>> t51b
 
     @property
     def end(self) -> float:
@@ -293,11 +303,23 @@ class Box:
         return simulate(self.parameters, self.end, *rigid, interval=self.dt)
 
 
+<<<<<<< HEAD
+def _check_interval(interval: float, t_end: float, most: int) -> None:
+    """Raise ArgumentError unless a run holds at least one output interval [time], and no more than ``most``."""
+    if interval > t_end:
+        raise ArgumentError(
+            f"--dt {interval:g} is longer than the run, --t-end {t_end:g}; give a shorter --dt"
+        )
+    if t_end / interval > most:
+        raise ArgumentError(
+            f"--t-end {t_end:g} holds more than {most} intervals of --dt {interval:g}"
+=======
 def _check_interval(dt: float, t_end: float) -> None:
     """Raise ArgumentError if the output interval is longer than the run, which would give a single state."""
     if dt > t_end:
         raise ArgumentError(
             f"--dt {dt:g} is longer than the run, --t-end {t_end:g}; give a shorter --dt"
+>>>>>>> t51b
         )
 
 
