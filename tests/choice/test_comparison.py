@@ -709,6 +709,10 @@ def test_no_output_replaces_a_file_of_the_switched_run(tmp_path: Path) -> None:
     )
     assert "this is an input" in run(*arguments, "-o", str(file)).stderr
     assert file.read_bytes() == content_before
+    page = file.rename(tmp_path / "switched.html")
+    refused = run(*arguments[:-1], str(tmp_path / "*.html"), "--report", str(page))
+    assert "this is an input" in refused.stderr
+    assert page.read_bytes() == content_before
 
 
 def list_legs(run: str) -> list[str]:

@@ -43,7 +43,7 @@ def refuse(*arguments: str) -> str:
             ("drive", str(PLATE.parent), "-o", "new", *PROGRAMS),
             "this is a folder; give the main deck in it, ",
         ),
-        (("card", "--part", "1", "--tr", "-1", "--td", "0.06"), "tr = -1 lies before the start of the run; give a tr"),
+        (("card", "--part", "1", "--tr", "-1", "--td", "0.06"), "tr is -1, before the start of the run; give"),
         (("card", "--part", "10-5", "--tr", "0.1", "--td", "0.2"), "give the smaller number first, 5-10"),
         (
             ("card", "--solver", "radioss", "--node", "5", "--tr", "0.01", "--td", "0.06", "--end", "0.05"),
@@ -146,10 +146,10 @@ def test_a_column_without_the_name_of_an_energy_gets_a_note() -> None:
 
 
 def test_a_time_column_with_another_name_gets_a_note(tmp_path: Path) -> None:
-    rows = "".join(f"{step / 10},{step % 7}\n" for step in range(50))
-    file = str(put(tmp_path / "odd.csv", f"mass,internal_energy\n{rows}".encode()))
+    table = Path(ENERGY).read_text().replace("time,", "mass,", 1)
+    file = str(put(tmp_path / "odd.csv", table.encode()))
     note = "'mass' is by its name not a time (mass); it was used as it is"
-    assert note in run("info", "--time", "mass", file).stderr
+    assert note in run("suggest", "--time", "mass", file).stderr
 
 
 def test_a_table_without_headings_or_rows_is_described(tmp_path: Path) -> None:
@@ -160,7 +160,7 @@ def test_a_table_without_headings_or_rows_is_described(tmp_path: Path) -> None:
     )
     file = str(put(tmp_path / "no_rows.csv", head.encode()))
     assert (
-        "only a line of headings was found, and no rows; a table of time and energy was expected; write rows of numbers"
+        "a table of time and energy was expected; write rows of numbers below the headings, or give another file"
     ) in refuse("plan", file)
 
 

@@ -354,19 +354,30 @@ class Table(Database):
         """Times as in the file, shape (n,) [time]; raise FormatError if they are not the times of a single run."""
         find_row = partial(find_line, self._text, self._begin, self._layout, self._time)
         values = self._values(self._time)
-        quantity = _find_quantity_as_time(self._layout, self._time)
-        if quantity and np.any(np.diff(values) < 0):
-            names = self._layout.names
-            columns = [i for i, title in enumerate(names) if is_time(title)]
-            menu = _list_columns(self._layout, columns or range(self._layout.columns))
-            raise FormatError(
-                f"{self.source}: column {self._time + 1} {self._layout.name(self._time)!r} is not a time: by its name "
-                f"it is another quantity ({quantity}), and its values decrease; choose with `time`: {menu}"
+        try:
+            times = check_one_run(
+                values, lambda state: f"{self.source}:{find_row(state)}"
             )
-        times = check_one_run(values, lambda state: f"{self.source}:{find_row(state)}")
+        except FormatError:
+            self._refuse_other_quantity_as_time()
+            raise
         if count_rows_per_time(times) > 1:
             self._refuse_rows_of_parts(times)
         return times
+
+    def _refuse_other_quantity_as_time(self) -> None:
+        """Raise FormatError if the name of the time column denotes another quantity."""
+        quantity = _find_quantity_as_time(self._layout, self._time)
+        if not quantity:
+            return
+        titles = enumerate(self._layout.names)
+        columns = [i for i, title in titles if is_time(title)]
+        menu = _list_columns(self._layout, columns or range(self._layout.columns))
+        title = self._layout.name(self._time)
+        raise FormatError(
+            f"{self.source}: column {self._time + 1} {title!r} is not a time: its name is that of another quantity "
+            f"({quantity}), and its values decrease; choose with `time`: {menu}"
+        )
 
     def _refuse_rows_of_parts(self, times: Samples) -> None:
         """Raise FormatError if the table has a row for each part at each time."""
