@@ -6,7 +6,11 @@ from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import name_units
 from d2rpick.base.graph import find_reachable
-from d2rpick.deck.ls_dyna_parts import DeckParts, find_element_cards
+from d2rpick.deck.ls_dyna_parts import (
+    DeckParts,
+    find_element_cards,
+    read_merged_bodies,
+)
 from d2rpick.rules.base import (
     BOTH,
     ERROR,
@@ -307,8 +311,11 @@ def _check_shared_nodes(case: Case) -> Iterator[PlacedMessage]:
     first = {event.unit.id: event for event in reversed(case.made_rigid)}
     if not first:
         return
-    always_rigid = filter(case.parts.is_rigid, case.parts.material_by_part)
-    bodies = {part: part for part in always_rigid} | find_lead_parts(first)
+    always_rigid = _find_always_rigid_bodies(case)
+    bodies = always_rigid | {
+        part: always_rigid.get(lead, lead)
+        for part, lead in find_lead_parts(first).items()
+    }
     cards = find_element_cards(case.deck, searched=True)
     if len(set(bodies.values())) < 2 or not cards:
         return
@@ -333,6 +340,23 @@ def _check_shared_nodes(case: Case) -> Iterator[PlacedMessage]:
             )
             problem = f"{low_name} and {high_name} share node {node} but become separate rigid bodies that both own it"
             yield field, f"{problem}; merge them: LRB {low} on the line of {high_name}"
+
+
+def _find_always_rigid_bodies(case: Case) -> dict[int, int]:
+    """Return the rigid body of each part with *MAT_RIGID, named after its lowest part.
+
+    The keyword *CONSTRAINED_RIGID_BODIES merges such parts.
+    """
+    pairs = [merged for _, merged in read_merged_bodies(case.deck)]
+
+    def find_merged(part: int) -> list[int]:
+        return [other for pair in pairs if part in pair for other in pair]
+
+    return {
+        part: min(find_reachable([part], find_merged))
+        for part in case.parts.material_by_part
+        if case.parts.is_rigid(part)
+    }
 
 
 def find_lead_parts(first: Mapping[int, SwitchEvent]) -> dict[int, int]:

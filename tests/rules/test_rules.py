@@ -298,9 +298,12 @@ def test_a_switched_part_merges_with_the_always_rigid_part_whose_nodes_it_shares
     )
     anvil = "*PART\nanvil\n         3         1         7\n*MAT_RIGID\n         7\n"
 
-    def find_shared(line: str) -> list[str]:
+    merged = anvil.replace("         3  ", "         4  ")
+    merged += "*CONSTRAINED_RIGID_BODIES\n         4         3\n"
+
+    def find_shared(line: str, more: str = "") -> list[str]:
         card = write_automatic_card(1, "0.02", rigid=[line])
-        deck = write(tmp_path, HEAD + PARTS + anvil + mesh + card + END)
+        deck = write(tmp_path, HEAD + PARTS + anvil + more + mesh + card + END)
         findings = check_deck(deck).findings
         return [found.message for found in findings if found.rule == "D2R108"]
 
@@ -309,6 +312,8 @@ def test_a_switched_part_merges_with_the_always_rigid_part_whose_nodes_it_shares
     assert "with part 3, which has *MAT_RIGID" in message
     assert "LRB 3 on its line" in message
     assert not find_shared("         1         3      PART")
+    assert not find_shared("         1         4      PART", merged)
+    assert find_shared("         1         4      PART", merged[: merged.index("*CON")])
     assert not find_shared("2")
 
 
