@@ -501,14 +501,14 @@ def _report_unknown_nodes(case: RunCase) -> Iterator[PlacedMessage]:
     the engine files switch.
 
     Fix: Define the group by /GRNOD/NODE, /GRNOD/PART or /GRNOD/SUBSET, or check walls and velocities yourself. Put a
-    missing starter deck next to the engine files.
+    missing starter deck into the folder of the engine files.
     """
     yield from _report_flaws(case, code=NOT_FOLLOWED)
     yield from _report_missing_starter(case)
 
 
 def _report_missing_starter(case: RunCase) -> Iterator[PlacedMessage]:
-    """Yield the first card that switches bodies of a starter deck that is not beside the engine files.
+    """Yield the first card that switches bodies of a starter deck that is not in the folder of the engine files.
 
     Cards from standard input belong to no folder, so that a starter deck cannot be expected.
     """
@@ -518,10 +518,10 @@ def _report_missing_starter(case: RunCase) -> Iterator[PlacedMessage]:
     if case.run.starter is not None or not cards or not is_file:
         return
     packed = find_packed_starter(main)
-    found = f"only {packed} lies beside it; unpack it" if packed else "put it beside it"
+    cure = f"unpack {packed}" if packed else "put it into the folder of this file"
     yield (
         cards[0].here,
-        f"the bodies that /{cards[0].name} switches are unknown, because the starter deck was not read: {found}",
+        f"the bodies that /{cards[0].name} switches are unknown, because the starter deck was not read; {cure}",
     )
 
 

@@ -87,6 +87,9 @@ def test_a_starter_deck_that_was_not_read_is_reported(tmp_path: Path) -> None:
     deck = str(put(tmp_path / "plate_0001.rad", b"/RUN/plate/1\n0.4\n/RBODY/OFF\n5\n"))
     (line,) = [line for line in run("check", deck).stdout.splitlines() if "D2R" in line]
     assert "plate_0001.rad:3:1: info D2R307 the bodies that /RBODY/OFF switches" in line
-    assert "because the starter deck was not read: put it beside it" in line
+    assert (
+        "because the starter deck was not read; put it into the folder of this file"
+        in line
+    )
     put(tmp_path / "plate_0000.rad.gz", b"packed")
-    assert "_0000.rad.gz lies beside it; unpack it" in run("check", deck).stdout
+    assert "was not read; unpack " in run("check", deck).stdout
