@@ -261,7 +261,7 @@ def _name_step_after_refusal(
         better = None
     if better is None and _lies_outside_flight(answer):
         line = write_command(question, "suggest")
-        return f"let d2rpick choose both times in the flight with {line}"
+        return f"choose both times in the flight with {line}"
     is_given_window = "--td-window" in question.times
     is_compared = answer.td_window is not None or (decision and decision.best_of)
     if is_given_window:
