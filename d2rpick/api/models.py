@@ -113,25 +113,13 @@ class Motion:
         _ = self.oscillator
         if (self.tr is None) != (self.td is None):
             raise ArgumentError("give --tr and --td together")
-        if self.tr is not None and self.td is not None and not self.tr < self.td:
-            raise ArgumentError(f"--tr {self.tr:g} is not before --td {self.td:g}")
+        if self.tr is not None and self.td is not None:
+            _check_windows((self.tr,), (self.td,), self.t_end)
         _check_interval(self.dt, self.t_end)
         if self.t_end / self.dt > MOST_REPLAYED:
             raise ArgumentError(
                 f"--t-end {self.t_end:g} holds more than {MOST_REPLAYED} intervals of --dt {self.dt:g}"
             )
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """A note on a release that lies after the end of the result."""
-        if self.td is None or self.td <= self.t_end:
-            return ()
-        return (
-            (
-                f"--td {self.td:g} lies after --t-end {self.t_end:g}, so the result ends before the release; "
-                "give a later --t-end"
-            ),
-        )
 
     @property
     def start(self) -> State:

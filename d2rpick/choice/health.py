@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from d2rpick.base.errors import Caution, RangeError
+from d2rpick.base.errors import Caution, RangeError, list_names
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.flight.flight import MOST_WORK
 from d2rpick.flight.internal_energy import find_largest
@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Balance, History, Samples
     from d2rpick.histories.names import Part
 
+# Code of the flaw that the first restart segments are missing.
+BEGINS_LATE: Final = "begins-late"
 # Largest hourglass energy as a fraction of the peak internal energy, for the model and for each part [-].
 # One source of the hourglass limit is a rule of thumb by DYNAmore (dynasupport.com/howtos/element/hourglass).
 # Another source of the hourglass limit is NCHRP Web-Only Document 179 (2010), table E-1.
@@ -367,6 +369,14 @@ def refuse_unsound(
 
 def list_flaws(history: History) -> Iterator[Caution]:
     """Yield the reasons why a run cannot be judged, each with a stable code."""
+    missing = history.missing_legs
+    if missing:
+        it = "it" if len(missing) == 1 else "them"
+        yield Caution(
+            BEGINS_LATE,
+            f"the record begins at {history.start:.6g}, and the start of the run is in {list_names(missing)}; name "
+            f"{it} too",
+        )
     highest = find_largest(history.energy)
     if highest > LARGEST_ENERGY:
         yield Caution(

@@ -19,10 +19,10 @@ from d2rpick.base.errors import (
 )
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.choice.health import (
+    BEGINS_LATE,
     Health,
     assess_health,
     list_flaws,
-    refuse_unsound,
     warn_about_engine,
     warn_about_health,
 )
@@ -237,9 +237,14 @@ def describe_run(
     flights: tuple[tuple[str, FreeFlight], ...] = ()
     energies: tuple[str, ...] = ()
     if history:
-        flaws = tuple(list_flaws(history))
         rigid = find_rigid_times(Reference(run, history))
         rigid = rigid or find_frozen_times(history)
+        # That the run was switched says more than that its start is missing.
+        flaws = tuple(
+            flaw
+            for flaw in list_flaws(history)
+            if not (rigid and flaw.code == BEGINS_LATE)
+        )
         flights = _find_flights_to_choose_from(
             select_model_momenta(history) if rigid else history
         )
@@ -492,11 +497,14 @@ def _warn_about_flights_outside(
 def _find_flights_to_choose_from(
     history: History,
 ) -> tuple[tuple[str, FreeFlight], ...]:
-    """Return the flights from which ``plan`` and ``suggest`` choose, and their sources; empty for a refused run."""
+    """Return the flights from which ``plan`` and ``suggest`` choose, and their sources; empty for a refused run.
+
+    The flights of a later restart segment are listed, although its start is needed to choose from them.
+    """
+    if any(flaw.code != BEGINS_LATE for flaw in list_flaws(history)):
+        return ()
     try:
-        settings = Settings()
-        refuse_unsound(history, settings)
-        flights = find_flights(history, settings)
+        flights = find_flights(history, Settings())
     except RangeError:
         return ()
     return tuple(

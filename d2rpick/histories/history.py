@@ -417,6 +417,16 @@ class History:
         return self.time[indices], are_peaks
 
     @property
+    def missing_legs(self) -> list[str]:
+        """Restart segments in the folder that precede the first of the files, if the record begins after 0."""
+        if self.time.size < 2 or self.start <= self.step:
+            return []
+        # Imported here to keep start-up fast.
+        from d2rpick.histories.source import find_earlier_legs
+
+        return find_earlier_legs(self.source)
+
+    @property
     def left_beside(self) -> str:
         """A question about later restart segments that the user did not name; empty if the folder contains none."""
         # Imported here to keep start-up fast.

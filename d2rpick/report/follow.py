@@ -216,8 +216,8 @@ def _describe_last_state(news: News, names: Sequence[str], step: str) -> Event:
         message = f"no flight since {news.flight.end:.6g}"
     elif step:
         message = "no flight was seen during the run"
-        if not news.was_switched:
-            message += "; d2rpick plan judges the whole record, which may show one"
+    if step and since is None and not news.was_switched:
+        message += "; d2rpick plan judges the whole record, which may show one"
     if step and news.was_switched:
         message += f"; this run was switched: {step}"
     elif step:

@@ -9,7 +9,7 @@ from d2rpick.choice.pair.grades import POOR, VERDICTS
 from d2rpick.choice.runs.study import StudyOfRuns, format_number_of_runs
 from d2rpick.report import (
     drive,
-    overview,
+    overview_table,
     page,
     parts,
     plan,
@@ -75,8 +75,11 @@ _LOOKS: Final[
     Mapping[str, tuple[Callable[[Any], list[tuple[str, str]]], Callable[[Any], Any]]]
 ] = {
     "overview": (
-        overview.list_overview_lines,
-        lambda answer: (("", ""), _select_known_facts(overview.list_facts(answer)[1:])),
+        overview_table.list_overview_lines,
+        lambda answer: (
+            ("", ""),
+            _select_known_facts(overview_table.list_facts(answer)[1:]),
+        ),
     ),
     "suggestion": (
         suggestion.list_verdict,

@@ -172,6 +172,11 @@ EXPLANATIONS_BY_TOPIC: Final = {
         ),
     },
     "Health of the run": {
+        "begins-late": Explanation(
+            "The record begins after the start of the run, and earlier restart segments lie in the same folder. They "
+            "show whether the run was switched, and when the load ended. d2rpick does not use the rest alone.",
+            "Name the earlier restart segments too.",
+        ),
         "blew-up": Explanation(
             "The energies of the run grow without limit, so the run is unstable. d2rpick does not use the run.",
             "Repair the model, and run it again.",

@@ -631,7 +631,9 @@ def test_parts_that_all_fly_on_their_own_are_not_to_be_left_out() -> None:
     parts = (Part(1, "bottom"), Part(2, "top"))
     separate = MovingApart(leaving=parts, staying=(), are_joined=False)
     assert separate.are_all_separate
-    assert separate.describe().startswith("bottom, top fly away from each other: ")
+    assert separate.describe().startswith(
+        "bottom, top fly away from each other: use a rigid body for each of them"
+    )
     assert separate.advice.startswith(
         "make each of these parts a rigid body of its own"
     )

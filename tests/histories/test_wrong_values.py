@@ -39,9 +39,9 @@ def refuse(file: str, *parts: str) -> str:
 @pytest.mark.parametrize(
     ("energy", "expected"),
     [
-        ("1e9", "is 1e+09 in the single state at 0.05, at most 282.6 (the largest"),
-        ("1e4", "is 10000 in the single state at 0.05, at most 282.6 (the largest"),
-        ("300", "is 300 in the single state at 0.05, at most 282.6 (the largest"),
+        ("1e9", "is 1e+09 in the single state at 0.05, but at most 282.6 (the largest"),
+        ("1e4", "is 10000 in the single state at 0.05, but at most 282.6 (the largest"),
+        ("300", "is 300 in the single state at 0.05, but at most 282.6 (the largest"),
         ("-500", "is -500 in the single state at 0.05, but at least 0 was expected"),
     ],
 )

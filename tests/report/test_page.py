@@ -497,7 +497,7 @@ def test_a_time_that_no_card_can_hold_costs_the_card_only(tmp_path: Path) -> Non
         )
     )
     page = read_page_of(tmp_path, "--td", "0.044", "--part", "3", str(motion))
-    assert "No card can be printed for these times: tr is -0.00" in page.text
+    assert "No card can be printed for these times: tr = -0.00" in page.text
 
 
 def test_options_set_by_the_environment_and_standard_input_are_needed_to_repeat_it(

@@ -41,10 +41,14 @@ class MovingApart(NamedTuple):
         """Describe how the parts move, and what one rigid body would do."""
         verb = "flies" if len(self.leaving) == 1 else "fly"
         names = list_names([part.name for part in self.leaving])
-        others = "each other" if self.are_all_separate else "the other parts"
+        if self.are_all_separate:
+            return (
+                f"{names} {verb} away from each other: use a rigid body for each of them, because one rigid body of "
+                "all would move wrongly"
+            )
         return (
-            f"{names} {verb} away from {others}: nothing connects them, and one rigid body of all would move like "
-            "none of them"
+            f"{names} {verb} away from the other parts: nothing connects them, and one rigid body of all would move "
+            "like none of them"
         )
 
     @property

@@ -42,8 +42,6 @@ if TYPE_CHECKING:
 
 # Sources that, unlike the energy alone, determine the start of a flight to within a few states.
 _SHARP: Final = ("momentum", "contact-force", "contact-energy", "energy-balance")
-# Parts are treated as not moving if their momentum is at most this fraction of the model's momentum [-].
-_HARDLY: Final = 0.1
 # _LEAST_FROZEN: shortest window of frozen energy that shows a rigid part, as a fraction of the record [-].
 # _LEAST_SHARE: smallest frozen energy that shows a rigid part, relative to the largest energy of all parts [-].
 _LEAST_FROZEN, _LEAST_SHARE = 0.05, 0.01
@@ -151,7 +149,7 @@ def prepare_switched_history(
         for time in (tr, td):
             history.energy_at(time)
         cautions += _warn_about_deforming(reference, tr, td)
-    absent = find_absent_windows(reference)
+    absent = find_rigid_windows(reference)
     new = []
     for absent_window in absent or _find_frozen_windows(history):
         start, end = absent_window.start, absent_window.end
@@ -186,14 +184,24 @@ def select_model_momenta(history: History) -> History:
 
 
 def find_rigid_times(reference: Reference) -> tuple[Times, ...]:
-    """Return the windows in which the output of the parts shows them to be rigid [time].
+    """Return the windows in which the output of the parts shows them to be rigid [time]."""
+    return tuple((window.start, window.end) for window in find_rigid_windows(reference))
 
-    If the parts are rigid throughout the record, parts with energy have no mass, or no part moves although the model
-    moves.
+
+def find_rigid_windows(reference: Reference) -> tuple[RigidWindow, ...]:
+    """Return the windows in which the output of the parts shows them to be rigid.
+
+    If there is none, the parts may be rigid throughout the record, as in the restart segment that begins at tr.
     """
-    windows = tuple(
-        (momenta.start, momenta.end) for momenta in find_absent_windows(reference)
-    )
+    windows = find_absent_windows(reference)
+    if windows or not is_rigid_throughout(reference):
+        return windows
+    history = reference.history
+    return (RigidWindow(history.start, history.end, (), whole=True),)
+
+
+def is_rigid_throughout(reference: Reference) -> bool:
+    """Return True if the parts are rigid throughout the record: parts other than springs with energy have no mass."""
     history = reference.history
     run = reference.run
     of_parts = next(
@@ -208,20 +216,17 @@ def find_rigid_times(reference: Reference) -> tuple[Times, ...]:
         None,
     )
     if (
-        windows
-        or of_parts is None
+        of_parts is None
         or whole is None
         or of_parts.masses is None
         or find_complete_stretches(of_parts, whole)
     ):
-        return windows
+        return False
     energies = give_if_written(lambda: np.abs(run.part_energies(run.parts)).max(axis=0))
-    void = energies is not None and bool(
-        ((of_parts.masses == 0) & (energies > 0)).any()
-    )
-    moved = float(np.abs(of_parts.values.sum(axis=1)).max())
-    rigid = void or moved < _HARDLY * float(np.abs(whole.values).max())
-    return ((history.start, history.end),) if rigid else ()
+    if energies is None:
+        return False
+    deforms = np.array([part not in run.springs for part in run.parts])
+    return bool(((of_parts.masses == 0) & (energies > 0) & deforms).any())
 
 
 def find_done_windows(
@@ -388,13 +393,18 @@ def refuse_partly_rigid(
 ) -> tuple[RigidWindow, ...]:
     """Raise RangeError if some of the chosen parts were rigid at some time from the start of the flight to td [time].
 
-    The result is all rigid windows of the run.
+    It is also raised if the parts were rigid throughout the record. The result is all rigid windows of the run.
 
     Parts that rest have no kinetic energy either, but no frozen deformation. If ``start`` is unknown, the test begins
     at the start of the record.
     """
     earliest = reference.history.start if start is None else start
     windows = find_absent_windows(reference)
+    if not windows and is_rigid_throughout(reference):
+        raise RangeError(
+            f"{', '.join(reference.history.source)}: this is a switched run, whose parts are rigid throughout the "
+            "record; choose times from the reference run, and compare this one with it (d2rpick verify)"
+        )
     for window in windows:
         overlaps = window.end > earliest and window.start < td
         if overlaps and window.is_frozen and not window.whole:
