@@ -566,10 +566,7 @@ def test_each_command_of_a_next_step_can_be_copied(
     """Whatever words surround it, exactly the command stands in the element with a button."""
     step = build_steps([("next", sentence)])
     assert re.findall('<pre class="wrap">(.*?)</pre>', step) == commands
-    shown = re.sub("<.*?>", "", step)
-    # A line that follows a command begins without the punctuation.
-    assert re.sub(r"\W", "", sentence) in re.sub(r"\W", "", shown)
-    assert not re.search("</pre>[.,;:]", step)
+    assert sentence in re.sub("<.*?>", "", step)
 
 
 def test_the_page_of_a_study_names_the_next_command_as_the_terminal_does(
