@@ -23,23 +23,22 @@ _MOST_NAMES: Final = 5
 def warn_about_lead(
     lead: int | None,
     switched_parts: Sequence[int],
-    known_parts: Sequence[Part] | None = None,
+    known_parts: Sequence[Part] = (),
 ) -> Iterator[Caution]:
     """Yield a warning if nothing shows that the lead part of a card without a deck exists.
 
-    ``known_parts`` are the parts of the history; None if there is no history.
+    ``known_parts`` are the parts of the history; empty if there is no history.
     """
-    known_ids = {part.id for part in known_parts or ()}
+    known_ids = {part.id for part in known_parts}
     if lead is None or lead in {*switched_parts, *known_ids}:
         return
     problem = f"`merge` {lead}: nothing shows that the model has a part {lead}"
     if known_parts:
         names = list_names([part.name for part in known_parts], most=_MOST_NAMES)
         problem = f"`merge` {lead}: the history has no part {lead}, only {names}"
-    addition = " with a `history`" if known_parts is None else ""
     yield Caution(
         UNKNOWN_LEAD,
-        f"{problem}; give a part of the model as `merge`, or the main deck as `deck`{addition} to check the card",
+        f"{problem}; give a part of the model as `merge`, or the main deck as `deck` to check the card",
     )
 
 
@@ -48,7 +47,7 @@ def collect_objections(
     deck: str | None,
     parts: int,
     lead: int | None = None,
-    known_parts: Sequence[Part] | None = None,
+    known_parts: Sequence[Part] = (),
 ) -> Iterator[Caution]:
     """Yield the findings of ``check`` for the deck with the card or, without a deck, warnings about what is unknown.
 

@@ -35,8 +35,11 @@ def find_deck_in_folder(request: Request) -> Request:
     decks = find_decks_of_run(folder)
     if len(decks) > 1:
         problem = f"{folder}: this folder contains {len(decks)} main decks ({list_names(decks, most=5)})"
-        cure = "name the deck of the run with `deck`, or use none with `no_deck`"
-        raise ArgumentError(f"{problem}{_describe_several_runs(folder)}; {cure}")
+        several_runs = _describe_several_runs(folder)
+        files = "give the files of one run, and " if several_runs else ""
+        raise ArgumentError(
+            f"{problem}{several_runs}; {files}name the deck of the run with `deck`, or use none with `no_deck`"
+        )
     if not decks:
         request.check_deck()
         return request
@@ -52,7 +55,7 @@ def _describe_several_runs(folder: str) -> str:
     except FormatError as error:
         if SEVERAL_RUNS in str(error):
             reason = str(error).removeprefix(f"{folder}: this folder contains ")
-            return f" and {reason}"
+            return f" and {reason.partition(', one was')[0]}"
     return ""
 
 

@@ -122,18 +122,6 @@ class Motion:
             )
 
     @property
-    def notes(self) -> tuple[str, ...]:
-        """A note on a release that lies after the end of the result."""
-        if self.td is None or self.td <= self.t_end:
-            return ()
-        return (
-            (
-                f"--td {self.td:g} lies after --t-end {self.t_end:g}, so the result ends before the release; "
-                "give a later --t-end"
-            ),
-        )
-
-    @property
     def start(self) -> State:
         """The state of the oscillator at time 0."""
         from d2rpick.vibration.oscillator import State

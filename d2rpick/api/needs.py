@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from d2rpick.api.option_names import replace_arguments
-from d2rpick.base.errors import D2RPickError
+from d2rpick.base.errors import D2RPickError, format_in_one_line
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -14,15 +14,30 @@ if TYPE_CHECKING:
 def list_needs_of_first_run(
     deck: str, has_parts: bool, wait: float | None
 ) -> Sequence[str]:
-    """Return the options that a first run of a deck needs besides the given ones; empty if the deck has an error."""
+    """Return the options that a first run of a deck needs besides the given ones, or a deck that can be read."""
     from d2rpick.running.first import list_needs  # Imported here to keep start-up fast.
 
     try:
         needs = list_needs(deck, has_parts, wait)
-    except (D2RPickError, OSError):
-        # The error is reported when the options are complete.
-        return ()
+    except (D2RPickError, OSError) as error:
+        return (_ask_for_other_deck(error),)
     return [replace_arguments(need) for need in needs]
+
+
+def list_needs_of_deck(deck: str) -> Sequence[str]:
+    """Return the need for another deck if a deck cannot be read; otherwise nothing."""
+    from d2rpick.deck import read_inventory  # Imported here to keep start-up fast.
+
+    try:
+        read_inventory(deck)
+    except (D2RPickError, OSError) as error:
+        return (_ask_for_other_deck(error),)
+    return ()
+
+
+def _ask_for_other_deck(error: D2RPickError | OSError) -> str:
+    """Return the need for a deck that can be read, with the reason why the given one cannot."""
+    return f"a readable DECK ({replace_arguments(format_in_one_line(error))})"
 
 
 def list_unknown_programs(starter: str | None, engine: str | None) -> Sequence[str]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any, Final
 
-from d2rpick.base.errors import ArgumentError, list_names
+from d2rpick.base.errors import ArgumentError
 from d2rpick.base.options import (
     NOT_NEGATIVE,
     POSITIVE,
@@ -202,7 +202,7 @@ class Request(ChoiceOptions, ReadingOptions):
             missing := [name for name in names if getattr(self, name) is None]
         ):
             wanted = [f"`{name}`" for name in missing]
-            needs = [f"needs {list_names(wanted)} too", *ratio_problem]
+            needs = [f"needs {' and '.join(wanted)} too", *ratio_problem]
             raise ArgumentError(
                 f"`{given_names[0]}` {', and '.join(needs)}: give all parameters of the oscillator"
             )

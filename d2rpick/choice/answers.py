@@ -45,6 +45,7 @@ from d2rpick.choice.pair.warnings import (
     POOR_KINETIC_SHARE,
     POOR_RESIDUAL,
     Expectation,
+    describe_end_of_load,
     estimate_time_after,
     find_largest_energy,
     list_objections_to_td,
@@ -731,6 +732,11 @@ def _explain_why_none(situation: Situation, ranked: Candidates) -> str:
     if situation.td > situation.latest_td:
         reasons = "; ".join(list_objections_to_td(situation)).removeprefix("td ")
         return f"td = {situation.td:.6g} lies {reasons}"
+    flight = situation.flight
+    if flight.start is not None and situation.td <= flight.start:
+        where = f"td = {situation.td:.6g} lies before {describe_end_of_load(situation)}"
+        end = "" if flight.end is None else f", and at most {flight.end:.6g}"
+        return f"{where}; choose a later td{end}"
     nearest = ranked[0]
     exceeded = list_exceeded_limits(situation, nearest)
     reasons = "; ".join((*nearest.notes, *(excess.message for excess in exceeded)))

@@ -99,11 +99,17 @@ def list_needs_of_drive(values: Mapping[str, Any]) -> Iterable[str]:
     Unknown programs alone are reported later, when the other options have been checked.
     """
     # Imported here to keep start-up fast.
-    from d2rpick.api.needs import deactivates_no_body, list_unknown_programs
+    from d2rpick.api.needs import (
+        deactivates_no_body,
+        list_needs_of_deck,
+        list_unknown_programs,
+    )
 
     deck = values.get("deck")
     unknown = list_unknown_programs(values.get("starter"), values.get("engine"))
     is_incomplete = not deck or not values.get("folder")
+    if deck and is_incomplete:
+        yield from list_needs_of_deck(deck)
     has_unknown_parts = not values.get("part") and (
         (unknown or is_incomplete) and deck and deactivates_no_body(deck)
     )

@@ -64,7 +64,6 @@ def replay(motion: Motion, output: Output) -> None:
 
     form = choose_history_format(output.output_file, HISTORIES, motion.write_as)
     output = output.beside()
-    output.notes(motion.notes, ())
     trajectory, switched = motion.computed()
     if output.plot:
         from d2rpick.report import figures, figures_models

@@ -126,7 +126,6 @@ class Output:
             from d2rpick.report import figures
 
             figures.choose_picture_format(self.plot)
-        _check_report(self.report)
         claimed: dict[str, str] = {}
         for name in ("output_file", "plot", "report"):
             file = getattr(self, name)
@@ -138,6 +137,7 @@ class Output:
                     raise D2RPickError(
                         f"{file}: {option_name} and {other_option} are the same file; give two"
                     )
+        _check_report(self.report)
         if (
             self.file is not None
             and not self.quiet

@@ -197,7 +197,7 @@ def refuse_overlapping_windows(windows: Sequence[Times]) -> tuple[Times, ...]:
             raise DeckError(f"tr and td are both {tr:g}; give a td after tr")
         if tr < 0:
             raise DeckError(
-                f"tr = {tr:g} lies before the start of the run; give a tr from 0"
+                f"tr is {tr:g}, before the start of the run; give a tr from 0"
             )
         if not tr < td < math.inf:
             raise DeckError(

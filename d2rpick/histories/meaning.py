@@ -347,7 +347,7 @@ def note_missed_energy(
     Examples
     --------
     >>> note_missed_energy(["z"], ["z", "internal_energy"])
-    ("'z' is not an energy by its name, but it was used, and 'internal_energy' was not",)
+    ("'z' is not an energy by its name, but it was used; if 'internal_energy' was meant, give it as `energy`",)
     >>> note_missed_energy(["boxIE_J"], ["boxIE_J", "internal_energy"])
     ()
     """
@@ -355,12 +355,9 @@ def note_missed_energy(
     odd = [name for name in chosen if not _has_name_of_energy(name)]
     if not odd or not others or {*others} & {*chosen}:
         return ()
-    was = "was" if len(others) == 1 else "were"
+    meant = " or ".join(map(repr, others[:_MOST_NAMED]))
     return (
-        (
-            f"{odd[0]!r} is not an energy by its name, but it was used, and "
-            f"{list_names([repr(name) for name in others], most=_MOST_NAMED)} {was} not"
-        ),
+        f"{odd[0]!r} is not an energy by its name, but it was used; if {meant} was meant, give it as `energy`",
     )
 
 

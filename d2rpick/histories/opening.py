@@ -20,6 +20,7 @@ from d2rpick.histories.source import (
     Source,
     find_unread_legs,
     list_tables_of_folder,
+    list_unread_databases,
     open_files,
 )
 
@@ -103,7 +104,11 @@ def open_run(
     """
     sources = open_files(names)
     files = [source.name for source in sources]
-    notes = (*_note_unused_tables(names), *_note_unread_legs(files))
+    notes = (
+        *_note_unused_tables(names),
+        *_note_unread_databases(names, files),
+        *_note_unread_legs(files),
+    )
     return open_sources(sources, selection, input_format, notes)
 
 
@@ -118,6 +123,21 @@ def _note_unused_tables(names: Sequence[str]) -> tuple[str, ...]:
     return (
         f"{listed} were left out: tables next to databases of the solver; name one to use it",
     )
+
+
+def _note_unread_databases(
+    names: Sequence[str], files: Sequence[str]
+) -> tuple[str, ...]:
+    """Return a note on files in the named folders whose names resemble those of databases, but that were not read."""
+    unread = [file for name in names for file in list_unread_databases(name, files)]
+    if not unread:
+        return ()
+    listed = list_names(unread, most=_MOST_TABLES)
+    if len(unread) == 1:
+        note = f"{listed} was not read, because the solver gives no file this name; if it belongs to the run"
+    else:
+        note = f"{listed} were not read, because the solver gives no files these names; if they belong to the run"
+    return (f"{note}, give all files by name",)
 
 
 def _note_unread_legs(files: Sequence[str]) -> tuple[str, ...]:

@@ -34,6 +34,13 @@ _NUMBER = r"\d+\.?\d*|\.\d+"
 # A table with this word in its first bytes is probably an energy history.
 _ENERGY_IN_HEAD: Final = b"energy"
 _HEAD_OF_TABLE: Final = 4096
+# Name that contains that of a database with energies, such as matsum01 or glstat.old.
+_LIKE_DATABASE: Final = r"(?i:.*(?:glstat|matsum|binout|d3thdt).*)"
+# Suffixes of results, figures, programs and decks, which are no history even if they are named after one.
+_OTHER_SUFFIXES: Final = (
+    *(".csv", ".html", ".json", ".k", ".key", ".md", ".ndjson"),
+    *(".pdf", ".png", ".py", ".rad", ".sh", ".svg", ".toml"),
+)
 # Beginning of an address on the network, such as https://.
 _ADDRESS: Final = re.compile(r"[a-z]+://", re.IGNORECASE)
 # Suffixes of decks. A folder with decks but no databases belongs to a run that has not been computed yet.
@@ -163,7 +170,9 @@ def open_source(name: str) -> Source:
 
 def _report_empty(name: str) -> FormatError:
     """Return the error for an empty file."""
-    return FormatError(f"{name}: the file is empty; has the run been started?")
+    return FormatError(
+        f"{name}: the file is empty, states were expected; wait until the run has written some, or give another file"
+    )
 
 
 def _list_files(name: str) -> Sequence[str]:
@@ -252,6 +261,25 @@ def list_tables_of_folder(name: str) -> list[str]:
         for file in sorted(Path(name).glob("*.csv"))
         if file.is_file() and _ENERGY_IN_HEAD in _read_head(file).lower()
     ]
+
+
+def list_unread_databases(name: str, files: Sequence[str]) -> list[str]:
+    """Return the files of a folder that are named like a database but are not among the ``files`` that were read.
+
+    No file is opened. The result is empty if ``name`` is not a folder.
+    """
+    if name == STDIN or not os.path.isdir(name):  # noqa: PTH112  pathlib would slow down start-up
+        return []
+    given = {os.path.basename(file) for file in files}  # noqa: PTH119  pathlib would slow down start-up
+    with os.scandir(name) as entries:
+        return sorted(
+            os.path.join(name, entry.name)  # noqa: PTH118  pathlib would slow down start-up
+            for entry in entries
+            if re.fullmatch(_LIKE_DATABASE, entry.name)
+            and entry.name not in given
+            and not entry.name.lower().endswith(_OTHER_SUFFIXES)
+            and entry.is_file()
+        )
 
 
 def _read_head(file: Path) -> bytes:

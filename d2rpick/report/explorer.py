@@ -173,7 +173,7 @@ def build_explorer(
 
 def _build_keys_of_judged(judged: PairVerdict | None) -> Markup:
     """Return the legend entries of the verified pair and of its finished switched run."""
-    names = [] if judged is None else ["the verified pair: tr and td"]
+    names = [] if judged is None else ["the judged pair: tr and td"]
     if judged and judged.computed:
         names.append("switched run, as computed")
     return join(

@@ -33,7 +33,7 @@ FORMATS: Final[Mapping[str, Sequence[str]]] = {
     "findings": (*PLAIN, "ndjson", "github", "junit", "sarif"),
 }
 # Modules that write only the table of a result, without the imports that its other formats need.
-_TABLES: Final = {"findings": "findings_table"}
+_TABLES: Final = {"findings": "findings_table", "overview": "overview_table"}
 
 
 class WrittenDeck(NamedTuple):

@@ -258,7 +258,7 @@ def add_step_to_copy(
 def ask_for_states_that_show_flight(states: int, start: float, end: float) -> str:
     """Return the advice to write more states if those of a record are too few to show a flight; otherwise empty."""
     # Imported here, because a card without a history needs no numpy.
-    from d2rpick.choice.pair.quality import ENOUGH_STATES
+    from d2rpick.choice.pair.few_states import ENOUGH_STATES
 
     if states >= ENOUGH_STATES:
         return ""
@@ -359,7 +359,21 @@ def name_way_out_of_run(
     if situation.history.parts:
         line = write_command(question._replace(parts=()), "parts")
         return f"{no_pair} with these parts; find other parts with {line}"
-    return f"{no_pair}: run it without switching, or make other parts rigid"
+    more = _ask_for_states_that_show_peaks(situation.history)
+    return f"{no_pair}: {more}run it without switching, or make other parts rigid"
+
+
+def _ask_for_states_that_show_peaks(history: History) -> str:
+    """Return the advice to write more states if those of a record are too few to show its peaks; otherwise empty."""
+    # Imported here, because a card without a history needs no numpy.
+    from d2rpick.choice.pair.few_states import ENOUGH_STATES
+
+    states = history.time.size
+    if states >= ENOUGH_STATES:
+        return ""
+    interval = history.duration / ENOUGH_STATES
+    more = f"write the states every {interval:.2g} or more often"
+    return f"{more}, because {states} states may miss a peak; if this does not help, "
 
 
 def name_step_after_switched_run(question: RepeatedQuestion) -> str:

@@ -9,7 +9,7 @@ from d2rpick.choice.pair.grades import POOR, VERDICTS
 from d2rpick.choice.runs.study import StudyOfRuns, format_number_of_runs
 from d2rpick.report import (
     drive,
-    overview,
+    overview_table,
     page,
     parts,
     plan,
@@ -75,8 +75,11 @@ _LOOKS: Final[
     Mapping[str, tuple[Callable[[Any], list[tuple[str, str]]], Callable[[Any], Any]]]
 ] = {
     "overview": (
-        overview.list_overview_lines,
-        lambda answer: (("", ""), _select_known_facts(overview.list_facts(answer)[1:])),
+        overview_table.list_overview_lines,
+        lambda answer: (
+            ("", ""),
+            _select_known_facts(overview_table.list_facts(answer)[1:]),
+        ),
     ),
     "suggestion": (
         suggestion.list_verdict,
@@ -120,6 +123,11 @@ _REASONS: Final[Mapping[str, Callable[[Any], list[tuple[str, str]]]]] = {
         trade_off.select_offers(answer, _FEW_ROWS)
     ),
 }
+
+
+# Heads of the table of the input files, and the bytes of a kilobyte.
+_FILES: Final = ("run", "written (UTC)", "size, kB", "file")
+_KILOBYTE: Final = 1000
 
 
 def _write_run_page(record: page.PageContext, *sections: Markup) -> str:
@@ -495,7 +503,7 @@ def study_page(
             ),
         ),
         build_section(
-            "Files", make_element("pre", _list_input_files(answer), class_="wrap")
+            "Files", build_scrolling_table("Files", _FILES, _list_input_files(answer))
         ),
         *page.build_method(command),
         signed=page.CHECKED,
@@ -512,8 +520,7 @@ def _add_meaning(caution: Caution) -> Caution:
 
 def _list_below_card(answer: StudyOfRuns) -> Sequence[tuple[str, str]]:
     """Return the results common to all runs, except those on the card of the common tr."""
-    outcome = study.list_outcome(answer)
-    return outcome if answer.common.tr is None else outcome[1:]
+    return study.list_outcome(answer)[1:]
 
 
 def _build_common_card(answer: StudyOfRuns) -> Markup:
@@ -548,15 +555,20 @@ def _build_common_card(answer: StudyOfRuns) -> Markup:
     return make_element("div", badge, *lines, class_=f"card {kind}")
 
 
-def _list_input_files(answer: StudyOfRuns) -> str:
-    """Return the input files with size and time, in the order of the runs."""
+def _list_input_files(answer: StudyOfRuns) -> list[tuple[Cell, ...]]:
+    """Return a row for each input file, in the order of the runs; a run without files has one row."""
     from datetime import UTC, datetime
 
-    files = dict.fromkeys(stamp for row in answer.runs for stamp in row.files)
-    return "\n".join(
-        f"{datetime.fromtimestamp(stamp.mtime_ns / 1e9, UTC):%Y-%m-%d %H:%M:%S} UTC {stamp.size:>12} {stamp.name}"
-        for stamp in files
-    )
+    rows: list[tuple[Cell, ...]] = []
+    for row in answer.runs:
+        if not row.files:
+            rows.append((row.source, None, None, "none could be read"))
+        for stamp in row.files:
+            written = datetime.fromtimestamp(stamp.mtime_ns / 1e9, UTC)
+            # Other hyphens and blanks would break the time into several lines.
+            time = f"{written:%Y\u2011%m\u2011%d\u00a0%H:%M:%S}"
+            rows.append((row.source, time, round(stamp.size / _KILOBYTE), stamp.name))
+    return rows
 
 
 def parts_page(

@@ -17,6 +17,7 @@ from d2rpick.choice.runs.study import (
     StudyOfRuns,
     StudyRow,
     describe_end_of_record,
+    describe_other_unit,
     explain_left_out,
     find_cut_runs,
     find_repeated_runs,
@@ -443,6 +444,9 @@ def list_next_step(
     if any(row.is_unchosen for row in judged):
         return [("next", name_step_to_parts(question, "study"))]
     worst = min(judged, key=lambda row: GRADES.index(row.quality or POOR))
+    if describe_other_unit(judged):
+        step = "convert the runs to one unit of time, and repeat the study"
+        return [("next", step)]
     of_worst = question._replace(files=(worst.source,))
     better_td = _find_shared_better_td(answer)
     if worst.quality == POOR and better_td is not None:

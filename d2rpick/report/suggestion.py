@@ -242,6 +242,15 @@ def list_next_step(
     return add_step_to_copy(answer.situation.history, [("next", step)])
 
 
+def _lies_outside_flight(answer: PairSuggestion) -> bool:
+    """Return True if the given td lies before or after the flight, so that no tr and no other parts help."""
+    situation = answer.situation
+    start = situation.flight.start
+    if start is None or answer.td_window is not None or answer.recommended is not None:
+        return False
+    return situation.td <= start or situation.td > situation.latest_td
+
+
 def _name_step_after_refusal(
     answer: PairSuggestion, decision: Decision | None, question: RepeatedQuestion
 ) -> str:
@@ -250,6 +259,9 @@ def _name_step_after_refusal(
     judged = answer.decision_on_better
     if decision is None and judged is not None and judged.verdict == DO_NOT_USE:
         better = None
+    if better is None and _lies_outside_flight(answer):
+        line = write_command(question, "suggest")
+        return f"choose both times in the flight with {line}"
     is_given_window = "--td-window" in question.times
     is_compared = answer.td_window is not None or (decision and decision.best_of)
     if is_given_window:
@@ -257,9 +269,7 @@ def _name_step_after_refusal(
     elif is_compared or answer.situation.flight.start is None:
         otherwise = name_step_after_flight(answer.situation, decision, question)
     elif decision is None and answer.situation.flight.start is not None:
-        otherwise = (
-            f"let d2rpick choose both times with {write_command(question, 'suggest')}"
-        )
+        otherwise = f"choose both times with {write_command(question, 'suggest')}"
     else:
         line = write_command(question, "explore", *question.times)
         otherwise = f"compare other td with {line}"

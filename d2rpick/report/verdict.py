@@ -421,7 +421,7 @@ def _format_comparison(switched: Comparison) -> list[str]:
     return [
         f"switched run  {make_printable(', '.join(switched.source))}; compared from td to {switched.end:.6g}",
         *([tables.as_text(COMPARED, values)] if values else []),
-        *(f"{name.ljust(38)}  {text}" for name, text in list_deviations(switched)),
+        *(f"{name.ljust(31)}  {text}" for name, text in list_deviations(switched)),
         *(f"note: {make_printable(note)}" for note in switched.notes),
     ]
 

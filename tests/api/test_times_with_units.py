@@ -154,19 +154,20 @@ def copy_plate(folder: Path, of_deck: str, of_run: str) -> str:
 
 @pytest.mark.parametrize(
     ("units", "unit", "wait"),
-    [(("s", "s"), "s", 0.02), (("ms", "ms"), "ms", 20.0), (("mus", "mus"), "us", 2e4)],
+    [(("s", "s"), "s", 2e-7), (("ms", "ms"), "ms", 2e-4), (("mus", "mus"), "us", 0.2)],
 )
 def test_a_first_run_takes_the_unit_of_its_deck(
     tmp_path: Path, units: tuple[str, str], unit: str, wait: float
 ) -> None:
     deck = copy_plate(tmp_path / "run", *units)
     assert find_time_unit(deck) == unit
-    written = d2.first(deck, tmp_path / "first", parts=1, wait="20ms")
+    written = d2.first(deck, tmp_path / "first", parts=1, wait="0.0002ms")
     assert written.wait == pytest.approx(wait)
     by_number = d2.first(deck, tmp_path / "second", parts=1, wait=wait)
     for name, same in zip(written.files, by_number.files, strict=True):
         assert Path(name).read_bytes() == Path(same).read_bytes()
-    typed = ("first", "--part", "1", "--wait", "20ms", deck, "-o", str(tmp_path / "3"))
+    words = ("first", "--part", "1", "--wait", "0.0002ms")
+    typed = (*words, deck, "-o", str(tmp_path / "3"))
     assert run(*typed).exit_code == 0
 
 

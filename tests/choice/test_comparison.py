@@ -707,9 +707,12 @@ def test_no_output_replaces_a_file_of_the_switched_run(tmp_path: Path) -> None:
         "--switched",
         str(tmp_path / "*.csv"),
     )
-    for option in ("-o", "--report"):
-        assert "this is an input" in run(*arguments, option, str(file)).stderr
+    assert "this is an input" in run(*arguments, "-o", str(file)).stderr
     assert file.read_bytes() == content_before
+    page = file.rename(tmp_path / "switched.html")
+    refused = run(*arguments[:-1], str(tmp_path / "*.html"), "--report", str(page))
+    assert "this is an input" in refused.stderr
+    assert page.read_bytes() == content_before
 
 
 def list_legs(run: str) -> list[str]:

@@ -25,9 +25,13 @@ def box() -> Reference:
     return read_reference([MATSUM], FLYING)
 
 
-def suggest(box: Reference, landing: float | None, **options: bool) -> Decision:
+def suggest(
+    box: Reference, landing: float | None, *, keep_vibration: bool = False
+) -> Decision:
     """Return the decision on the pair that is suggested before a landing."""
-    answer = suggest_in_run(box, None, Settings(landing=landing, **options))
+    answer = suggest_in_run(
+        box, None, Settings(landing=landing, keep_vibration=keep_vibration)
+    )
     assert answer.decision is not None
     return answer.decision
 

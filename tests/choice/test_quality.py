@@ -581,11 +581,11 @@ def test_a_measured_momentum_answers_the_doubt_about_an_unknown_load() -> None:
 @pytest.mark.parametrize("noise", [0.0, 1.0])
 def test_noise_is_not_blamed_on_the_output_interval(noise: float) -> None:
     """The energy has 5 states per period, or seems to because of its noise, which no shorter interval removes."""
-    time = np.arange(600) * 1e-3
+    time = np.linspace(0.0, 0.599, 600)
     fast = np.cos(np.pi / 5 * time / 1e-3) ** 2
     slow = np.cos(np.pi / 200 * time / 1e-3) ** 2
     random = np.random.default_rng(3).standard_normal(time.size)
-    energy = 20 + (slow + 1.5 * random if noise else fast)
+    energy = np.asarray(20 + (slow + 1.5 * random if noise else fast), dtype=np.float64)
     history = History(time, energy, source=("run",), format="csv", channel="E")
     (cause,) = list_causes_of_record(history, None, 0.5)
     if noise:

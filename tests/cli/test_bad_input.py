@@ -40,7 +40,7 @@ def replace_line(number: int, line: str) -> bytes:
 
 # Files that are not histories: content, further arguments, and parts of the message.
 FILES = {
-    "empty": (b"", (), ["input: the file is empty", "has the run been started?"]),
+    "empty": (b"", (), ["input: the file is empty", "wait until the run has written some"]),
     "binary": (bytes(range(256)) * 20, (), ["input: binary data", "csv", "glstat", "export"]),
     "prose": (b"Dear all,\nplease find enclosed\n", (), ["input:1: 'Dear all,'", "a table of time and energy"]),
     "header only": (HEAD.encode(), (), ["input:1: ", "no rows"]),

@@ -47,7 +47,7 @@ def test_info_asks_for_a_column_with_the_command_that_chooses_it() -> None:
     assert lines["record"].startswith("cannot be judged until the column")
     assert lines["next"].endswith(f"{ROLLOVER} (or another column instead of 2: 3, 4)")
     chosen = list_first_lines(*read_command(lines["next"]))
-    assert chosen["record"].startswith("can be used")
+    assert chosen["record"].startswith("suitable")
     assert "choose with --energy" in run_json("info", ROLLOVER)["verdict_reason"]
 
 
@@ -61,8 +61,8 @@ def test_info_asks_for_one_of_several_curves(tmp_path: Path) -> None:
 def test_info_leaves_the_verdict_on_the_windows_to_plan() -> None:
     for history in (ENERGY, MATSUM):
         record = list_first_lines("info", history)["record"]
-        assert record.startswith("can be used")
-        assert record.endswith("d2rpick plan judges the windows in them")
+        assert record.startswith("suitable for choosing times")
+        assert record.endswith("(d2rpick plan judges the windows in them)")
 
 
 # A run that was switched already.
@@ -157,7 +157,7 @@ def test_a_set_of_parts_that_cannot_be_used_is_an_objection() -> None:
 def test_parts_without_a_set_at_the_given_td_choose_it_themselves() -> None:
     question = ("parts", "--deck", DECK, "--td", "0.05", MATSUM)
     step = list_first_lines(*question)["next"]
-    assert step.startswith("let d2rpick choose the times with d2rpick parts")
+    assert step.startswith("choose the times with d2rpick parts")
     words = shlex.split(step.partition("with d2rpick ")[2])
     assert run(*words).stdout.startswith("use with care")
 

@@ -43,7 +43,7 @@ def refuse(*arguments: str) -> str:
             ("drive", str(PLATE.parent), "-o", "new", *PROGRAMS),
             "this is a folder; give the main deck in it, ",
         ),
-        (("card", "--part", "1", "--tr", "-1", "--td", "0.06"), "tr = -1 lies before the start of the run; give a tr"),
+        (("card", "--part", "1", "--tr", "-1", "--td", "0.06"), "tr is -1, before the start of the run; give"),
         (("card", "--part", "10-5", "--tr", "0.1", "--td", "0.2"), "give the smaller number first, 5-10"),
         (
             ("card", "--solver", "radioss", "--node", "5", "--tr", "0.01", "--td", "0.06", "--end", "0.05"),
@@ -57,7 +57,7 @@ def refuse(*arguments: str) -> str:
         ),
         (
             ("suggest", *OSCILLATOR, "--frame-mass", "3", ENERGY),
-            "--stiffness needs --alpha, --v0 too, and needs either --frame-mass or --beta, not both",
+            "--stiffness needs --alpha and --v0 too, and needs either --frame-mass or --beta, not both",
         ),
         (
             ("suggest", "--channel", "kinetic", ENERGY),
@@ -66,7 +66,7 @@ def refuse(*arguments: str) -> str:
         (("plan", "--report", "page.txt", ENERGY), "page.txt: the report is an HTML page; name it page.html"),
         (
             ("suggest", "--time", "internal_energy", ENERGY),
-            "column 6 'internal_energy' is by its name not a time (internal energy); choose with --time: 1 'time'",
+            "(internal energy), and its values decrease; choose with --time: 1 'time'",
         ),
         (("plan", "--part", "1 2", MATSUM), "no part '1 2' (separate parts by commas: 1,2); there are"),
         (("info", "https://example.org/glstat"), "an address on the network cannot be read; download the file"),
@@ -135,20 +135,21 @@ def test_a_lead_part_that_no_card_makes_rigid_is_named() -> None:
     )
 
 
-def test_a_release_after_the_end_of_a_replay_is_named() -> None:
-    times = ("--tr", "0.006", "--td", "0.08", "--t-end", "0.01", "--dt", "0.001")
-    answer = run("replay", *OSCILLATOR, "--v0", "6", *times)
-    assert "the result ends before the release; give a later --t-end" in answer.stderr
-
-
 def test_a_column_without_the_name_of_an_energy_gets_a_note() -> None:
     """Before, a displacement was judged as the internal energy without a word."""
-    note = "'z' is not an energy by its name, but it was used, and 'internal_energy' was not"
+    note = "'z' is not an energy by its name, but it was used; if 'internal_energy' was meant, give it as --energy"
     assert note in run("suggest", "--energy", "2", ENERGY).stderr
     assert (
         "by its name"
         not in run("suggest", "--energy", "internal_energy", ENERGY).stderr
     )
+
+
+def test_a_time_column_with_another_name_gets_a_note(tmp_path: Path) -> None:
+    table = Path(ENERGY).read_text().replace("time,", "mass,", 1)
+    file = str(put(tmp_path / "odd.csv", table.encode()))
+    note = "'mass' is by its name not a time (mass); it was used as it is"
+    assert note in run("suggest", "--time", "mass", file).stderr
 
 
 def test_a_table_without_headings_or_rows_is_described(tmp_path: Path) -> None:
@@ -159,7 +160,7 @@ def test_a_table_without_headings_or_rows_is_described(tmp_path: Path) -> None:
     )
     file = str(put(tmp_path / "no_rows.csv", head.encode()))
     assert (
-        "only a line of headings was found, and no rows; a table of time and energy was expected; write rows of numbers"
+        "a table of time and energy was expected; write rows of numbers below the headings, or give another file"
     ) in refuse("plan", file)
 
 
@@ -236,6 +237,7 @@ def test_a_folder_with_several_decks_and_runs_is_refused_once(tmp_path: Path) ->
     answer = refuse("suggest", str(tmp_path))
     assert "this folder contains 2 main decks (" in answer
     assert "and several runs (" in answer
+    assert "; give the files of one run, and name the deck of the run with" in answer
 
 
 def test_a_failed_comparison_does_not_blame_values_within_their_limits() -> None:
@@ -257,6 +259,16 @@ def test_a_packed_starter_is_named(tmp_path: Path, arguments: tuple[str, ...]) -
     answer = refuse(*arguments, str(tmp_path / "plate_0001.rad"))
     assert "no parts were found, because no starter deck" in answer
     assert f"; unpack {tmp_path / 'plate_0000.rad.gz'}" in answer
+
+
+@pytest.mark.parametrize("command", ["first", "drive"])
+def test_a_folder_in_place_of_a_deck_is_named_with_what_is_missing(
+    command: str,
+) -> None:
+    answer = refuse(command, str(PLATE.parent))
+    assert answer.startswith("d2rpick: missing: -")
+    assert "a readable DECK (" in answer
+    assert f"this is a folder; give the main deck in it, {PLATE})" in answer
 
 
 def test_a_file_is_no_folder_for_a_deck(tmp_path: Path) -> None:
@@ -311,6 +323,7 @@ def test_runs_of_a_study_in_different_units_are_named(tmp_path: Path) -> None:
     assert "mixed-units: the times of" in answer.stderr
     assert "are 1000 times those of" in answer.stderr
     assert "cut-runs" not in answer.stderr
+    assert "next       convert the runs to one unit of time" in answer.stdout
     assert run_json("study", ENERGY, file)["common_tr"] is None
 
 

@@ -187,7 +187,7 @@ def test_a_value_of_the_wrong_type_is_refused_with_what_was_expected(
 def test_a_key_of_any_length_is_named_in_a_short_message() -> None:
     put(Path("d2rpick.toml"), f"{'x' * 10_000} = 1\n")
     refusal = read_refusal("suggest", ENERGY)
-    assert f"d2rpick.toml:1: unknown key '{'x' * 59} ..., one of " in refusal
+    assert f"d2rpick.toml:1: unknown key '{'x' * 59} ..., but one of " in refusal
     assert "xxx" not in refusal.partition(" ..., ")[2]
 
 

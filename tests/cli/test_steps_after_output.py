@@ -76,7 +76,7 @@ def test_the_verdict_stands_at_the_head_of_a_card() -> None:
     # The path of the history decides where the lines are wrapped.
     head = " ".join(line.removeprefix("$").strip() for line in lines[1:4])
     assert head.startswith("Verdict according to")
-    assert "internal_energy: use" in head
+    assert "(internal_energy): use" in head
 
 
 def test_the_step_after_an_extraction_judges_the_table(tmp_path: Path) -> None:

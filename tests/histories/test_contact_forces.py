@@ -12,7 +12,7 @@ from d2rpick.base.errors import FormatError
 from d2rpick.choice.overview import describe_run
 from d2rpick.histories.contact_forces import ContactForce
 from d2rpick.histories.opening import Selection, open_run
-from d2rpick.report import overview
+from d2rpick.report import overview_table
 from tests.command import run_json
 from tests.made_binout import GLSTAT, LsdaWriter
 from tests.made_d3plot import D3plotWriter, State
@@ -308,7 +308,7 @@ def test_info_lists_them(tmp_path: Path) -> None:
     survey_of_run = describe_run(open_run(names), Selection())
     lines_on_forces = [
         value
-        for name, value in overview.list_facts(survey_of_run)
+        for name, value in overview_table.list_facts(survey_of_run)
         if name == "contact force"
     ]
     assert lines_on_forces == [

@@ -177,7 +177,7 @@ def test_missing_files_and_folders_are_named(tmp_path: Path) -> None:
 
 def test_the_selection_reaches_the_reader(file: Write) -> None:
     assert read_history(
-        [file(CSV)], Selection(time="2", energy=("1",))
+        [file(b"first,second\n0.0,1.0\n0.1,1.5\n")], Selection(time="2", energy=("1",))
     ).time.tolist() == [1.0, 1.5]
     np.testing.assert_array_equal(
         read_history([file(GLSTAT)], Selection(energy=("Internal Energy",))).energy,
@@ -328,6 +328,27 @@ def test_a_pattern_gives_what_the_folder_gives_and_names_what_it_leaves_out(
     assert "remarks.txt was left out" in notes
     table_note = f"{tmp_path / 'energy.csv'} was left out: a table next to databases of the solver; name it to use it"
     assert by_folder.notes == (table_note,)
+
+
+def test_a_file_of_a_folder_that_is_named_like_a_database_is_not_left_out_unseen(
+    tmp_path: Path,
+) -> None:
+    """A folder gives the files that the solver names; a file of a restart that the user renamed is not among them."""
+    for name in ("matsum", "matsum01", "matsum.png", "matsum_plan.k", "d3hsp"):
+        put(tmp_path / name, DYNA_HEAD + b"\n" + STATES)
+    (tmp_path / "binout_files").mkdir()
+    run = open_run([str(tmp_path)])
+    assert run.sources == (str(tmp_path / "matsum"),)
+    renamed = str(tmp_path / "matsum01")
+    (note,) = run.notes
+    assert note == (
+        f"{renamed} was not read, because the solver gives no file this name; if it belongs to the run, give all "
+        "files by name"
+    )
+    put(tmp_path / "old.glstat", STATES)
+    (note,) = open_run([str(tmp_path)]).notes
+    assert note.startswith(f"{renamed}, {tmp_path / 'old.glstat'} were not read")
+    assert not open_run([str(tmp_path / "matsum")]).notes
 
 
 def test_what_is_named_beside_a_pattern_is_not_left_out(tmp_path: Path) -> None:

@@ -597,7 +597,7 @@ def test_a_verified_pair_is_marked_where_the_best_pair_is_drawn(verified: Path) 
     assert flight["view"][0] < 0.1 < 0.37 < flight["view"][1]
     text = verified.read_text("utf-8")
     assert "For comparison: the best pair for this td" in text
-    assert "the verified pair: tr and td" in text
+    assert "the judged pair: tr and td" in text
 
 
 def test_a_page_without_a_verified_pair_marks_none(paper: Path) -> None:

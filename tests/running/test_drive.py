@@ -431,7 +431,7 @@ def test_a_disk_that_is_full_is_told_with_what_to_do(tmp_path: Path) -> None:
     ):
         with (
             pytest.raises((D2RPickError, OSError), match=message),
-            driving.driver(resume=True),
+            driving.driver(resume=False),
         ):
             raise OSError(fault, os.strerror(fault))
 

@@ -15,6 +15,7 @@ from d2rpick.choice.pair.aftermath import (
     compute_static_change,
 )
 from d2rpick.choice.pair.candidates import Candidates, judge_candidates
+from d2rpick.choice.pair.few_states import ENOUGH_STATES
 from d2rpick.choice.pair.grades import (
     FAIR,
     GOOD,
@@ -69,8 +70,6 @@ _BAND: Final = 0.25
 # MOST_WORTH_OF_FAIR: largest vibration-error energy of a fair pair, relative to the energy of the next contact [-].
 MOST_WORTH_OF_GOOD: Final = 0.01
 MOST_WORTH_OF_FAIR: Final = 0.05
-# Smallest number of states that resolve a flight; if there are fewer, a shorter output interval is proposed.
-ENOUGH_STATES: Final = 200
 # More frequent output is proposed as a cure only if fewer than this number of states lie before td.
 _FEW_STATES: Final = 20
 # Largest number of parts that are named in a sentence.

@@ -424,7 +424,7 @@ def _check_rigid_window(
         or lasts_longer(td, rigid[1])
     ):
         rigid_text = f"the energy of the switched run is constant from {rigid[0]:.6g} to {rigid[1]:.6g}"
-        yield f"{rigid_text}, not from tr {tr:g} to td {td:g}"
+        yield f"{rigid_text}, not from tr {tr:g} to td {td:g}; leave out `tr` and `td` to compare that window"
 
 
 def _check_locked_in_energy(

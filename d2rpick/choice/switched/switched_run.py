@@ -42,8 +42,6 @@ if TYPE_CHECKING:
 
 # Sources that, unlike the energy alone, determine the start of a flight to within a few states.
 _SHARP: Final = ("momentum", "contact-force", "contact-energy", "energy-balance")
-# Parts are treated as not moving if their speed is at most this fraction of the speed of the model [-].
-_HARDLY: Final = 0.1
 # _LEAST_FROZEN: shortest window of frozen energy that shows a rigid part, as a fraction of the record [-].
 # _LEAST_SHARE: smallest frozen energy that shows a rigid part, relative to the largest energy of all parts [-].
 _LEAST_FROZEN, _LEAST_SHARE = 0.05, 0.01
@@ -203,11 +201,7 @@ def find_rigid_windows(reference: Reference) -> tuple[RigidWindow, ...]:
 
 
 def is_rigid_throughout(reference: Reference) -> bool:
-    """Return True if the parts are rigid throughout the record.
-
-    Parts with energy then have no mass, or no part moves although the model moves. A moving part may have little
-    momentum because another mass is much larger, so speeds are compared.
-    """
+    """Return True if the parts are rigid throughout the record: parts other than springs with energy have no mass."""
     history = reference.history
     run = reference.run
     of_parts = next(
@@ -229,24 +223,10 @@ def is_rigid_throughout(reference: Reference) -> bool:
     ):
         return False
     energies = give_if_written(lambda: np.abs(run.part_energies(run.parts)).max(axis=0))
-    void = energies is not None and bool(
-        ((of_parts.masses == 0) & (energies > 0)).any()
-    )
-    if void or whole.masses is None:
-        return void
-    fastest, speed = (
-        np.divide(
-            np.abs(momenta.values).max(axis=(0, 2)),
-            masses,
-            out=np.zeros(masses.shape),
-            where=masses > 0,
-        ).max()
-        for momenta, masses in (
-            (of_parts, of_parts.masses),
-            (whole, whole.masses),
-        )
-    )
-    return bool(fastest < _HARDLY * speed)
+    if energies is None:
+        return False
+    deforms = np.array([part not in run.springs for part in run.parts])
+    return bool(((of_parts.masses == 0) & (energies > 0) & deforms).any())
 
 
 def find_done_windows(

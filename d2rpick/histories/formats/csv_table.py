@@ -121,8 +121,13 @@ def find_time_column(
     """
     if wanted is not None:
         column = find_column(source, layout, wanted)
-        _refuse_other_quantity_as_time(source, layout, column)
-        return column, []
+        quantity = _find_quantity_as_time(layout, column)
+        if not quantity:
+            return column, []
+        name = layout.name(column)
+        return column, [
+            f"{name!r} is by its name not a time ({quantity}); it was used as it is"
+        ]
     times = [
         i for i, column in enumerate(layout.names[: layout.trusted]) if is_time(column)
     ]
@@ -158,18 +163,11 @@ def find_time_column(
     ]
 
 
-def _refuse_other_quantity_as_time(source: str, layout: Layout, column: int) -> None:
-    """Raise FormatError if a column that the user chose as the time has the name of another quantity."""
+def _find_quantity_as_time(layout: Layout, column: int) -> str:
+    """Return the quantity that the name of a time column denotes; empty if it may be a time."""
     name = layout.name(column)
     meaning = None if is_time(name) else find_meaning(name)
-    if meaning is None:
-        return
-    times = [i for i, title in enumerate(layout.names) if is_time(title)]
-    menu = _list_columns(layout, times or range(layout.columns))
-    quantity = meaning.quantity.replace("_", " ")
-    raise FormatError(
-        f"{source}: column {column + 1} {name!r} is by its name not a time ({quantity}); choose with `time`: {menu}"
-    )
+    return meaning.quantity.replace("_", " ") if meaning else ""
 
 
 def find_internal_energy(
@@ -355,12 +353,31 @@ class Table(Database):
     def time(self) -> Samples:
         """Times as in the file, shape (n,) [time]; raise FormatError if they are not the times of a single run."""
         find_row = partial(find_line, self._text, self._begin, self._layout, self._time)
-        times = check_one_run(
-            self._values(self._time), lambda state: f"{self.source}:{find_row(state)}"
-        )
+        values = self._values(self._time)
+        try:
+            times = check_one_run(
+                values, lambda state: f"{self.source}:{find_row(state)}"
+            )
+        except FormatError:
+            self._refuse_other_quantity_as_time()
+            raise
         if count_rows_per_time(times) > 1:
             self._refuse_rows_of_parts(times)
         return times
+
+    def _refuse_other_quantity_as_time(self) -> None:
+        """Raise FormatError if the name of the time column denotes another quantity."""
+        quantity = _find_quantity_as_time(self._layout, self._time)
+        if not quantity:
+            return
+        titles = enumerate(self._layout.names)
+        columns = [i for i, title in titles if is_time(title)]
+        menu = _list_columns(self._layout, columns or range(self._layout.columns))
+        title = self._layout.name(self._time)
+        raise FormatError(
+            f"{self.source}: column {self._time + 1} {title!r} is not a time: its name is that of another quantity "
+            f"({quantity}), and its values decrease; choose with `time`: {menu}"
+        )
 
     def _refuse_rows_of_parts(self, times: Samples) -> None:
         """Raise FormatError if the table has a row for each part at each time."""

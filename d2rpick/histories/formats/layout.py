@@ -177,9 +177,6 @@ def _report_no_table(text: Text, lines: Sequence[str]) -> FormatError:
         )
         cure = "add a column with the times"
     elif len(numbered) == 1 and _SEPARATED_WORDS.match(line.strip()):
-        problem = (
-            f"{text.name}:{number}: only a line of headings was found, and no rows"
-        )
         cure = "write rows of numbers below the headings, or give another file"
     elif _LISTING_OF_LS_DYNA in line:
         problem = f"{text.name}:{number}: this is a listing of LS-DYNA"

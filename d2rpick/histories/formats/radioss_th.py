@@ -312,7 +312,10 @@ class TimeHistory(Database):
             begin, _, count, _ = marks[index]
             start = self._records.at + state * self._stride
             where = f"{self.source}: state {state + 1}: a record of {count} numbers was expected"
-            cure = f"if the states before are good, cut the file to {start} bytes"
+            cure = (
+                "copy the file again; to use the states before, unpack the file if it is packed, and cut it to "
+                f"{start} bytes"
+            )
             raise FormatError(f"{where} at byte {start + begin}; {cure}")
         stop = f"{self.source}: the file ends within state {states + 1}, which was left out"
         return states, (stop,) if bytes_left else ()
