@@ -320,13 +320,12 @@ def build_pairs(rows: Iterable[tuple[str, str]]) -> Markup:
 def build_steps(rows: Iterable[tuple[str, str]]) -> Markup:
     """Return a list of names and descriptions in which each command has a line of its own, with a button to copy it.
 
-    A command ends before a hint in parentheses, or with the clause. The text after it begins a line, so it has no
-    punctuation in front.
+    A command ends before a hint in parentheses, or with the clause.
 
     Examples
     --------
     >>> print(build_steps([("next", "look with d2rpick info 'my run.csv'. Then plan")]))
-    <dl><div><dt>next</dt><dd>look with <pre class="wrap">d2rpick info 'my run.csv'</pre>Then plan</dd></div></dl>
+    <dl><div><dt>next</dt><dd>look with <pre class="wrap">d2rpick info 'my run.csv'</pre>. Then plan</dd></div></dl>
     """
     return build_pairs((name, _mark_commands(text)) for name, text in rows)
 
@@ -337,8 +336,7 @@ def _mark_commands(text: str) -> Markup:
     for command in _COMMAND.finditer(text):
         line = make_element("pre", command[0].rstrip(".,;:"), class_="wrap")
         pieces += [text[end : command.start()], line]
-        after = text[command.start() + len(command[0].rstrip(".,;:")) :]
-        end = len(text) - len(after.lstrip(".,;: "))
+        end = command.start() + len(command[0].rstrip(".,;:"))
     return join([*pieces, text[end:]])
 
 

@@ -535,7 +535,7 @@ def _name_step_without_set(answer: Parts, question: RepeatedQuestion) -> str:
         return f"judge the parts with {line}{deck.hint}"
     if question.times:
         line = write_command(question, "parts")
-        return f"let d2rpick choose the times with {line}"
+        return f"choose the times with {line}"
     if not any(row.flight and row.flight.flies is not None for row in answer.rows):
         line = write_command(question, "plan", new_parts=["all"])
         return f"if all parts fly together, plan their switching with {line}"

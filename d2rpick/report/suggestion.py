@@ -261,7 +261,7 @@ def _name_step_after_refusal(
         better = None
     if better is None and _lies_outside_flight(answer):
         line = write_command(question, "suggest")
-        return f"let d2rpick choose both times in the flight with {line}"
+        return f"choose both times in the flight with {line}"
     is_given_window = "--td-window" in question.times
     is_compared = answer.td_window is not None or (decision and decision.best_of)
     if is_given_window:
@@ -269,9 +269,7 @@ def _name_step_after_refusal(
     elif is_compared or answer.situation.flight.start is None:
         otherwise = name_step_after_flight(answer.situation, decision, question)
     elif decision is None and answer.situation.flight.start is not None:
-        otherwise = (
-            f"let d2rpick choose both times with {write_command(question, 'suggest')}"
-        )
+        otherwise = f"choose both times with {write_command(question, 'suggest')}"
     else:
         line = write_command(question, "explore", *question.times)
         otherwise = f"compare other td with {line}"

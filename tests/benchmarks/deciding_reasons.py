@@ -99,7 +99,7 @@ _NAMES: Final = {
     _SWITCHED: """
         choice.switched.same_model._OF_ANOTHER_MODEL choice.switched.switch_times._EARLY
         choice.switched.same_model.MOST_MOMENTUM_ERROR choice.switched.comparison._REPORTED_OFF
-        choice.switched.comparison._ABOUT choice.switched.frozen._MUCH choice.switched.switched_run._HARDLY
+        choice.switched.comparison._ABOUT choice.switched.frozen._MUCH
         choice.switched.switched_run._SAME_STATES choice.td.plan._LONGER
         choice.switched.comparison._STATES_BEFORE choice.switched.switch_times._AT_CONTACT
         """,

@@ -157,7 +157,7 @@ def test_a_set_of_parts_that_cannot_be_used_is_an_objection() -> None:
 def test_parts_without_a_set_at_the_given_td_choose_it_themselves() -> None:
     question = ("parts", "--deck", DECK, "--td", "0.05", MATSUM)
     step = list_first_lines(*question)["next"]
-    assert step.startswith("let d2rpick choose the times with d2rpick parts")
+    assert step.startswith("choose the times with d2rpick parts")
     words = shlex.split(step.partition("with d2rpick ")[2])
     assert run(*words).stdout.startswith("use with care")
 

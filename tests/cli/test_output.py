@@ -733,8 +733,9 @@ def test_a_td_at_the_landing_is_answered_by_its_reason_and_the_pair_before_it() 
     assert (
         first == "no pair to use  td = 0.38 lies after the end of the flight at 0.379"
     )
-    # The pair before the landing cannot be used either, so the step leads to other parts.
-    assert second.startswith("next            judge the parts that vibrate together")
+    assert second.startswith(
+        "next            choose both times in the flight with d2rpick"
+    )
     assert " verdict" not in result.stdout
     assert "no-candidate" not in result.stderr
     assert (

@@ -87,7 +87,7 @@ def test_a_number_too_wide_is_refused() -> None:
         ([], "no window"),
         ([(0.09, 0.02)], "tr < td was expected"),
         ([(0.02, 0.02)], "tr and td are both 0.02; give a td after tr"),
-        ([(-1.0, 1.0)], "tr = -1 lies before the start of the run"),
+        ([(-1.0, 1.0)], "tr is -1, before the start of the run"),
         ([(0.0, float("inf"))], "tr < td was expected"),
         ([(0.02, float("nan"))], "tr < td was expected"),
         ([(0.02, 0.09), (0.05, 0.2)], "overlaps or touches"),

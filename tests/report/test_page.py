@@ -497,7 +497,7 @@ def test_a_time_that_no_card_can_hold_costs_the_card_only(tmp_path: Path) -> Non
         )
     )
     page = read_page_of(tmp_path, "--td", "0.044", "--part", "3", str(motion))
-    assert "No card can be printed for these times: tr = -0.00" in page.text
+    assert "No card can be printed for these times: tr is -0.00" in page.text
 
 
 def test_options_set_by_the_environment_and_standard_input_are_needed_to_repeat_it(
@@ -566,10 +566,7 @@ def test_each_command_of_a_next_step_can_be_copied(
     """Whatever words surround it, exactly the command stands in the element with a button."""
     step = build_steps([("next", sentence)])
     assert re.findall('<pre class="wrap">(.*?)</pre>', step) == commands
-    shown = re.sub("<.*?>", "", step)
-    # A line that follows a command begins without the punctuation.
-    assert re.sub(r"\W", "", sentence) in re.sub(r"\W", "", shown)
-    assert not re.search("</pre>[.,;:]", step)
+    assert sentence in re.sub("<.*?>", "", step)
 
 
 def test_the_page_of_a_study_names_the_next_command_as_the_terminal_does(

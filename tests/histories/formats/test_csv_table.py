@@ -463,7 +463,7 @@ def test_columns_that_cannot_be_told(text: str, asked: list[str], reason: str) -
             "run,IE,KE\na1,1,2\na2,2,3\n",
             "no column has the name of a time; choose with `time`",
         ),
-        ("time,IE\n", "table:1: only a line of headings was found, and no rows"),
+        ("time,IE\n", "table:1: 'time,IE' was found, and no rows"),
         ("time,IE\n0.0,1.5", "no states"),
     ],
 )
