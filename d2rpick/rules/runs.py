@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import os
 from itertools import pairwise
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import name_units
 from d2rpick.deck.radioss_columns import AFTER_DELAY
-from d2rpick.deck.radioss_files import AT_REST, NOT_FOLLOWED, THROUGH_WALL
+from d2rpick.deck.radioss_files import (
+    AT_REST,
+    NOT_FOLLOWED,
+    THROUGH_WALL,
+    find_packed_starter,
+)
 from d2rpick.rules.base import ERROR, INFO, RADIOSS, WARNING, PlacedMessage, RunCase
 from d2rpick.rules.example import (
     WINDOW,
@@ -479,6 +485,7 @@ def _find_left_rigid_parts(
         _make_run_with("/GRNOD/BOX/8\nbox\n", write_row(1), _write_wall(8)),
         _make_run_with(_write_velocity(8)),
         _make_run_with(_PLACES, "/TRANSFORM/TRA/1\n", _write_wall(0, 0, 0.1)),
+        Example(_LEGS["box_0001.rad"], _LEGS, name="box_0001.rad"),
     ]
 )
 @make_rule_decorator(
@@ -490,11 +497,32 @@ def _find_left_rigid_parts(
 def _report_unknown_nodes(case: RunCase) -> Iterator[PlacedMessage]:
     """D2R406 and D2R407 check what rigid walls and initial velocities do to the nodes of rigid bodies. They evaluate
     node groups defined by nodes, parts and subsets, and the distance from a wall. They do not evaluate other groups,
-    nodes moved by /TRANSFORM, or ids inside a //SUBMODEL.
+    nodes moved by /TRANSFORM, or ids inside a //SUBMODEL. Without the starter deck, nothing is known of the bodies that
+    the engine files switch.
 
-    Fix: Define the group by /GRNOD/NODE, /GRNOD/PART or /GRNOD/SUBSET, or check walls and velocities yourself.
+    Fix: Define the group by /GRNOD/NODE, /GRNOD/PART or /GRNOD/SUBSET, or check walls and velocities yourself. Put a
+    missing starter deck into the folder of the engine files.
     """
-    return _report_flaws(case, code=NOT_FOLLOWED)
+    yield from _report_flaws(case, code=NOT_FOLLOWED)
+    yield from _report_missing_starter(case)
+
+
+def _report_missing_starter(case: RunCase) -> Iterator[PlacedMessage]:
+    """Yield the first card that switches bodies of a starter deck that is not in the folder of the engine files.
+
+    Cards from standard input belong to no folder, so that a starter deck cannot be expected.
+    """
+    cards = [card for leg in case.run.legs for card, _, _ in leg.switched]
+    main = case.run.deck.path
+    is_file = os.path.isfile(main)  # noqa: PTH113  pathlib would slow down start-up
+    if case.run.starter is not None or not cards or not is_file:
+        return
+    packed = find_packed_starter(main)
+    cure = f"unpack {packed}" if packed else "put it into the folder of this file"
+    yield (
+        cards[0].here,
+        f"the bodies that /{cards[0].name} switches are unknown, because the starter deck was not read; {cure}",
+    )
 
 
 @set_passing(

@@ -80,3 +80,16 @@ def test_a_finished_run_is_left_to_plan_which_sees_flights_that_follow_does_not(
     """Plan shows a flight from 0.383 to the end; a running run is judged without the states that follow."""
     text = " ".join(run("follow", "--once", "--part", "box", BOX).stdout.split())
     assert "no flight since 0.382004; d2rpick plan judges the whole record" in text
+
+
+def test_a_starter_deck_that_was_not_read_is_reported(tmp_path: Path) -> None:
+    """Before, check of an engine file alone said that no part becomes rigid, without a finding."""
+    deck = str(put(tmp_path / "plate_0001.rad", b"/RUN/plate/1\n0.4\n/RBODY/OFF\n5\n"))
+    (line,) = [line for line in run("check", deck).stdout.splitlines() if "D2R" in line]
+    assert "plate_0001.rad:3:1: info D2R307 the bodies that /RBODY/OFF switches" in line
+    assert (
+        "because the starter deck was not read; put it into the folder of this file"
+        in line
+    )
+    put(tmp_path / "plate_0000.rad.gz", b"packed")
+    assert "was not read; unpack " in run("check", deck).stdout
