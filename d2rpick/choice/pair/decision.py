@@ -53,7 +53,7 @@ _USE_BEST: Final = (
     "use this pair if only the motion matters, or compare it with a finished switched run "
     "(d2rpick verify)"
 )
-_AVOID_BEST: Final = "choose another flight, or make other parts rigid"
+_AVOID_BEST: Final = "choose another flight, if there is one, or make other parts rigid"
 # _USE_COMPARED: the advice that replaces _USE_BEST if a switched run has been compared.
 _USE_COMPARED: Final = "use this pair if only the motion matters"
 # _MORE_OFTEN: beginning of the advice on too few states per period.
