@@ -43,6 +43,8 @@ _OTHER_LIMITS: Final = (
     "--min-rigid",
     "--tolerance",
 )
+# If a record has fewer states than this, their interval says nothing about the one that is needed.
+_FEWEST: Final = 20
 # Option that accepts no pair in a flight that only the energy shows.
 _STRICT: Final = "--strict"
 # Advice on a table whose run has no deck at hand.
@@ -264,13 +266,16 @@ def ask_for_states_that_show_flight(states: int, start: float, end: float) -> st
 
     if states >= ENOUGH_STATES:
         return ""
+    if states < _FEWEST:
+        count = "1 state shows" if states == 1 else f"{states} states show"
+        return (
+            f"continue the run, or write the states more often, because {count} no flight; if no flight is found even "
+            "then, "
+        )
     interval = (end - start) / ENOUGH_STATES
-    often = f"every {interval:.2g} or more often" if interval else "more often"
-    may_miss = "1 state shows" if states == 1 else f"{states} states may miss"
-    what = "no flight" if states == 1 else "a flight"
     return (
-        f"continue the run if it has not reached a flight, or write the states {often}, because {may_miss} {what}; "
-        "if no flight is found even then, "
+        f"continue the run if it has not reached a flight, or write the states every {interval:.2g} or more often, "
+        f"because {states} states may miss a flight; if no flight is found even then, "
     )
 
 
