@@ -49,7 +49,7 @@ _FIRST: Final = b'{"source": '
 # First bytes of the summary line, which follows the rows.
 _LAST: Final = b'{"schema": '
 # Fields of a row that JSON stores as arrays.
-_LISTS: Final = ("warnings", "parts")
+_LISTS: Final = ("warnings", "parts", "parts_in_files")
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -356,6 +356,7 @@ class Ledger:
                 **{name: record[name] for name in PLAIN.keys if name not in _LISTS},
                 warnings=tuple(record["warnings"]),
                 parts=None if record["parts"] is None else tuple(record["parts"]),
+                parts_in_files=tuple(record["parts_in_files"]),
                 acceptable=np.array(record["acceptable"][0]).reshape(-1, 2),
                 alike=np.array(record["acceptable"][1]).reshape(-1, 2),
                 profile=None

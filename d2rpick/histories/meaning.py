@@ -71,6 +71,9 @@ _OTHER_QUANTITY: Final = (
     r"|accel|veloc|displac|moment|force|pressure|stress|strain(?!.?en)|temperature|ratio|mass|time.?step)"
     r"|(?<![A-Z])KE(?![A-Z])"
 )
+# Pattern of a coordinate, velocity or acceleration, and of a unit at the end of a name that no energy has.
+_OF_A_MOTION: Final = r"(?i:[uvar]?[xyz])"
+_OTHER_UNIT: Final = r"(?i)[\s_/,(\[](?:[kcm]?m|[cm]?mps|[kcm]?m/m?s|deg|rad|k?N|[kMG]?Pa|kg|g|t|%)[)\]]?\s*$"
 # Normalised name of the rotational energy, which Radioss writes although the kinetic energy includes it.
 ROTATION_ENERGY: Final = "rotationenergy"
 # Pattern of other energy names: Abaqus identifiers, and "energy" in other languages without spaces.
@@ -369,6 +372,19 @@ def refuse_other_quantity(channel: str, where: str) -> None:
         raise FormatError(
             f"{problem}; write the internal energy too, or give this name as `energy` if it is one after all"
         )
+
+
+def may_be_energy(name: str, unit: str = "") -> bool:
+    """Return False if a name, or a unit in the name or beside it, denotes something other than an energy.
+
+    Examples
+    --------
+    >>> [name for name in ("reference_m", "vz", "Displacement", "strain", "a", "E_kJ", "door") if may_be_energy(name)]
+    ['a', 'E_kJ', 'door']
+    """
+    is_motion = re.fullmatch(_OF_A_MOTION, remove_unit(name)) is not None
+    has_other_unit = any(re.search(_OTHER_UNIT, text) for text in (name, f"[{unit}]"))
+    return not (is_motion or has_other_unit or _find_word_of_other_quantity(name))
 
 
 def _find_word_of_other_quantity(channel: str) -> str:

@@ -44,7 +44,9 @@ def describe_expectation(decision: Decision) -> str:
     worst = decision.worst_case
     if worst == "the same":
         return decision.expected
-    effect = ", which hardly changes the motion" if decision.allows_only_motion else ""
+    effect = ""
+    if decision.allows_only_motion:
+        effect = "; its energy is small beside that of the next contact"
     return f"{decision.expected}. At worst: {worst}{effect}"
 
 

@@ -43,6 +43,10 @@ _OTHER_LIMITS: Final = (
     "--min-rigid",
     "--tolerance",
 )
+# If a record has fewer states than this, their interval says nothing about the one that is needed.
+_FEWEST: Final = 20
+# Option that accepts no pair in a flight that only the energy shows.
+_STRICT: Final = "--strict"
 # Advice on a table whose run has no deck at hand.
 _ADD_COLUMNS: Final = "; without a deck, add columns mass, x_momentum, y_momentum and z_momentum to the table"
 # Reason why the card of several parts needs the main deck.
@@ -262,13 +266,16 @@ def ask_for_states_that_show_flight(states: int, start: float, end: float) -> st
 
     if states >= ENOUGH_STATES:
         return ""
+    if states < _FEWEST:
+        count = "1 state shows" if states == 1 else f"{states} states show"
+        return (
+            f"continue the run, or write the states more often, because {count} no flight; if no flight is found even "
+            "then, "
+        )
     interval = (end - start) / ENOUGH_STATES
-    often = f"every {interval:.2g} or more often" if interval else "more often"
-    may_miss = "1 state shows" if states == 1 else f"{states} states may miss"
-    what = "no flight" if states == 1 else "a flight"
     return (
-        f"continue the run if it has not reached a flight, or write the states {often}, because {may_miss} {what}; "
-        "if no flight is found even then, "
+        f"continue the run if it has not reached a flight, or write the states every {interval:.2g} or more often, "
+        f"because {states} states may miss a flight; if no flight is found even then, "
     )
 
 
@@ -284,10 +291,17 @@ def name_lack_of_pairs(question: RepeatedQuestion) -> str:
     ]
     # This value accepts every pair, so no other value allows more.
     limits = [limit for limit in limits if limit != "--min-quality poor"]
+    remedies = []
+    if limits:
+        remedies.append("another value" if len(limits) == 1 else "other values")
+    if _STRICT in words:
+        limits.append(_STRICT)
+        remedies.append(f"an answer without {_STRICT}")
     if not limits:
         return _NO_PAIR
-    values = "another value" if len(limits) == 1 else "other values"
-    return f"{_NO_PAIR} with {list_names(limits)} ({values} may allow one)"
+    return (
+        f"{_NO_PAIR} with {list_names(limits)} ({' or '.join(remedies)} may allow one)"
+    )
 
 
 def name_step_after_flight(
@@ -358,9 +372,29 @@ def name_way_out_of_run(
         return f"{no_pair}: {cure}{_name_way_to_switched_run(cure, question)}"
     if situation.history.parts:
         line = write_command(question._replace(parts=()), "parts")
+        if advice := _ask_for_longer_run(situation):
+            return (
+                f"{no_pair} with these parts: {advice}, or find other parts with {line}"
+            )
         return f"{no_pair} with these parts; find other parts with {line}"
-    more = _ask_for_states_that_show_peaks(situation.history)
-    return f"{no_pair}: {more}run it without switching, or make other parts rigid"
+    advice = ", or ".join(
+        filter(
+            None,
+            (
+                _ask_for_longer_run(situation),
+                _ask_for_states_that_show_peaks(situation.history),
+            ),
+        )
+    )
+    first = f"{advice}; if this does not help, " if advice else ""
+    return f"{no_pair}: {first}run it without switching, or make other parts rigid"
+
+
+def _ask_for_longer_run(situation: Situation) -> str:
+    """Return the advice to continue a run if its record ends in the flight; otherwise empty."""
+    if situation.flight.start is None or situation.flight.end is not None:
+        return ""
+    return "continue the run, because its record ends in the flight"
 
 
 def _ask_for_states_that_show_peaks(history: History) -> str:
@@ -373,7 +407,7 @@ def _ask_for_states_that_show_peaks(history: History) -> str:
         return ""
     interval = history.duration / ENOUGH_STATES
     more = f"write the states every {interval:.2g} or more often"
-    return f"{more}, because {states} states may miss a peak; if this does not help, "
+    return f"{more}, because {states} states may miss a peak"
 
 
 def name_step_after_switched_run(question: RepeatedQuestion) -> str:

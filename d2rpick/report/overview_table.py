@@ -42,7 +42,9 @@ _NOT_JUDGED: Final = (
     "cannot be judged until the column with the internal energy is chosen"
 )
 # Advice if momenta are written but show no flight.
-_GIVE_END_OF_LOAD: Final = "if you know that the parts fly after a load, give its end to d2rpick plan with --after"
+_GIVE_END_OF_LOAD: Final = (
+    "give the end of a load after which the parts fly to d2rpick plan with --after"
+)
 # Advice if the momenta that are written exclude every flight.
 _RUN_WITHOUT_SWITCHING: Final = f"{NEVER_FLIES}: run it without switching"
 # Advice if a load of unknown kind acts in every flight.

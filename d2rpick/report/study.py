@@ -17,6 +17,7 @@ from d2rpick.choice.runs.study import (
     StudyOfRuns,
     StudyRow,
     describe_end_of_record,
+    describe_other_model,
     describe_other_unit,
     explain_left_out,
     find_cut_runs,
@@ -84,6 +85,7 @@ PLAIN: Final = row(
                                            "or for columns", later=True),
     Field("is_unchosen", "flag?", "true if this is the energy of the whole model because no part or energy was chosen, "
                                   "although the files show which parts fly", later=True),
+    Field("parts_in_files", "texts", "number and title of each part in the files of this run", later=True),
 )  # fmt: skip
 _ERROR: Final = Field(
     "common_error", "number?",
@@ -293,8 +295,12 @@ def list_outcome(answer: StudyOfRuns) -> list[tuple[str, str]]:
             runs += " (repeated runs count once)"
         # Nothing is common to a single run.
         name = "tr" if different == 1 else "common tr"
+        extent = "as good: every"
+        if common.keeps_tolerance is False:
+            name = "no tr is within the timing tolerance of every run; the best compromise is tr"
+            extent = "admissible in every run:"
         shared = f"{name} = {common.tr:g}, for {runs}, {_name_error(answer)} {_format_error_span(errors)}"
-        shared += f"; as good: every tr from {format_window(*common.window)}"
+        shared += f"; {extent} tr from {format_window(*common.window)}"
     return [
         (heading, shared),
         ("each run", _count_verdicts(answer)),
@@ -441,6 +447,9 @@ def list_next_step(
     if not judged:
         first = RepeatedQuestion(files=question.files[:1])
         return [("next", f"look at the first run with {write_command(first, 'info')}")]
+    if describe_other_model(judged):
+        step = "study the runs of each model separately; d2rpick info RUN lists the parts of a run"
+        return [("next", step)]
     if any(row.is_unchosen for row in judged):
         return [("next", name_step_to_parts(question, "study"))]
     worst = min(judged, key=lambda row: GRADES.index(row.quality or POOR))

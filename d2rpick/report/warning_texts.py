@@ -423,6 +423,12 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "The basis is not the same in all runs, so the errors of the runs are not directly comparable.",
             "Compare the verdicts, or write the same output in all runs.",
         ),
+        "mixed-models": Explanation(
+            "The files of the runs contain different parts, or other titles of the same parts. A tr of one model means "
+            "nothing for another model.",
+            "Study the runs of each model separately. If only the output of the runs differs, or a variant has another "
+            "part, check that all runs switch the same parts.",
+        ),
         "mixed-parts": Explanation(
             "The runs were judged by the energies of different parts. The common tr then belongs to different switches "
             "in different runs.",

@@ -393,6 +393,9 @@ def test_where_no_time_keeps_the_timing_tolerance_of_all_the_least_loss_counts_a
     (caution,) = answer.cautions
     assert caution.code == "timing-tolerance"
     assert "grows by more than 0.05" in caution.message
+    (_, shared), *_ = list_outcome(answer)
+    assert shared.startswith("no tr is within the timing tolerance of every run; ")
+    assert "common tr" not in shared
 
 
 @given(
@@ -482,6 +485,35 @@ def test_runs_judged_by_different_parts_are_told() -> None:
     named = [replace(row, energy=f"energy of {row.parts}") for row in rows]
     outcome = dict(list_outcome(compare_rows(10.0, named)))
     assert outcome["judged"] == "energy of (1, 2) in 2 runs; energy of (1,) in 1 run"
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "difference"),
+    [
+        (("1 box", "2 step"), ("1 box", "3"), "only a has part 2 'step'"),
+        (("1 box",), ("1 box", "3"), "only b has part 3"),
+        (("1 box", "2"), ("1 car", "2"), "part 1 is 'box' in a and 'car' in b"),
+        (("1 box", "2 step"), ("1 BOX", "2 st"), ""),
+        (("1 box",), (), ""),
+    ],
+)
+def test_runs_with_other_parts_are_those_of_another_model(
+    first: tuple[str, ...], second: tuple[str, ...], difference: str
+) -> None:
+    rows = [
+        make_study_row(
+            "a", (1, 2), parts_in_files=first, verdict="use", quality="good"
+        ),
+        make_study_row(
+            "b", (1, 2), parts_in_files=second, verdict="use", quality="good"
+        ),
+    ]
+    answer = compare_rows(10.0, rows)
+    messages = [caution.message for caution in answer.cautions]
+    ((_, step),) = list_next_step(answer, RepeatedQuestion(files=("a", "b")))
+    assert len(messages) == bool(difference)
+    assert difference in "".join(messages)
+    assert ("each model separately" in step) == bool(difference)
 
 
 @given(st.floats(1e-6, 1e3), st.floats(0, 1))

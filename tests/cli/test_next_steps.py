@@ -6,6 +6,7 @@ import shlex
 from math import sin
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from d2rpick.choice.pair.cures import name_parts_in_verify, omit_comparison
@@ -581,6 +582,24 @@ def test_a_plan_of_short_flights_asks_for_shorter_windows_only_once() -> None:
     last = find_line("next", "plan", "--min-rigid", "0.002", *given, ENERGY)
     assert last.startswith("no pair of this run can be used with --after 0.01, ")
     assert "--min-rigid 0.002 (other values may allow one): every flight is" in last
+
+
+def test_a_plan_of_a_record_that_ends_in_the_flight_asks_for_a_longer_run(
+    tmp_path: Path,
+) -> None:
+    time = np.linspace(0, 1, 400)
+    rows = [f"{t},{100 * t}" for t in time]
+    history = tmp_path / "rising.csv"
+    history.write_text("\n".join(["time,internal energy", *rows, ""]))
+    step = find_line("next", "plan", "--after", "0.1", str(history))
+    assert "continue the run, because its record ends in the flight; if this" in step
+
+
+def test_a_plan_names_the_option_strict_that_excludes_every_pair() -> None:
+    step = find_line("next", "plan", "--strict", "--energy", "boxIE_J", ROLLOVER)
+    assert step.startswith(
+        "no pair of this run can be used with --strict (an answer without --strict may allow one)"
+    )
 
 
 def test_the_step_of_a_plan_without_a_mass_is_not_another_tour() -> None:

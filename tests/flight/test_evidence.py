@@ -409,7 +409,23 @@ def test_the_energy_alone_is_said_to_be_uncertain_and_strict_refuses_it() -> Non
         for w in suggestion["warnings"]
         if w["code"] == "flight-from-energy"
     )
-    assert re.search(r"d2rpick waits for another [\d.]+ to be safe", message)
+    td = suggestion["recommended"]["td"]
+    assert re.search(
+        rf"d2rpick waits for another [\d.]+, a third of the time until td = {td:.6g}",
+        message,
+    )
+
+
+def test_suggest_and_plan_name_the_same_ends_of_a_flight_from_the_energy() -> None:
+    """The ends depend on td, so the row of a plan contains those that belong to its td."""
+    question = ("--energy", "boxIE_J", ROLLOVER)
+    flight = run_json("suggest", *question)["flight"]
+    (window,) = run_json("plan", *question)["windows"]
+    assert flight["source"] == "energy"
+    assert (window["flight_start"], window["flight_end"]) == (
+        flight["start"],
+        flight["end"],
+    )
 
 
 def test_windows_of_acceptable_tr_hold_the_recommended_one_and_verify_throughout() -> (

@@ -53,7 +53,7 @@ _USE_BEST: Final = (
     "use this pair if only the motion matters, or compare it with a finished switched run "
     "(d2rpick verify)"
 )
-_AVOID_BEST: Final = "choose another flight, or make other parts rigid"
+_AVOID_BEST: Final = "choose another flight, if there is one, or make other parts rigid"
 # _USE_COMPARED: the advice that replaces _USE_BEST if a switched run has been compared.
 _USE_COMPARED: Final = "use this pair if only the motion matters"
 # _MORE_OFTEN: beginning of the advice on too few states per period.
@@ -219,21 +219,16 @@ class Decision(NamedTuple):
         low, high = self.mean_energy_bounds
         if limits.low <= low and high <= limits.high:
             return ""
-        accepted = f"d2rpick verify accepts a switched run with {format_bounds(limits)}"
+        accepted = f"d2rpick verify accepts only {format_bounds(limits)}"
         if high < limits.low:
             # The limit is rounded down to a whole per cent, so that it accepts the lower bound.
             lowest = floor(100 * low) / 100
             return (
-                f" ({accepted}, so it will reject the run because of its mean energy; to accept it because only the "
-                f"motion is used, set `min_mean_energy` to {lowest:g})"
+                f" ({accepted}, so it will reject the switched run; to accept it because only the motion is used, set "
+                f"`min_mean_energy` to {lowest:g})"
             )
-        if low > limits.high:
-            return (
-                f" ({accepted}, so it will reject the run because of its mean energy)"
-            )
-        return (
-            f" ({accepted}; only the comparison shows whether the run will be accepted)"
-        )
+        will = "will" if low > limits.high else "may"
+        return f" ({accepted}, so it {will} reject the switched run)"
 
     @property
     def worst_case(self) -> str:

@@ -35,6 +35,7 @@ from d2rpick.choice.pair.windows import (
     interpolate_error,
     make_error_profile,
 )
+from d2rpick.choice.parts.deck_of_run import is_different_title
 from d2rpick.choice.question import read_reference
 from d2rpick.histories.digits import format_distinctly
 from d2rpick.histories.names import Selection
@@ -112,7 +113,8 @@ class StudyRow:
     ``record_end`` [time]. ``curve`` is an outline of the energy, shape (2, k), if it was requested. ``energy`` is the
     name of the energy by which the run was judged. ``parts`` contains the ids of the parts to which it belongs; None
     for the whole model or a column. ``is_unchosen`` is True if it is the energy of the whole model because no part or
-    energy was chosen, although the files show which parts fly.
+    energy was chosen, although the files show which parts fly. ``parts_in_files`` contains the id and title of each
+    part in the files of the run.
     """
 
     source: str
@@ -137,6 +139,7 @@ class StudyRow:
     energy: str | None = None
     parts: tuple[int, ...] | None = None
     is_unchosen: bool | None = None
+    parts_in_files: tuple[str, ...] = ()
     acceptable: Samples = field(default_factory=lambda: np.zeros((0, 2)))
     alike: Samples = field(default_factory=lambda: np.zeros((0, 2)))
     profile: Samples | None = None
@@ -264,6 +267,9 @@ def judge_run(question: Question, source: str) -> StudyRow:
         curve=curve,
         record_end=end,
         is_unchosen=shows_parts and not is_chosen,
+        parts_in_files=tuple(
+            f"{part.id} {part.title}".rstrip() for part in reference.run.parts
+        ),
     )
 
 
@@ -491,12 +497,46 @@ def _warn_about_runs(rows: Sequence[StudyRow], common: Common) -> Iterator[Cauti
         "the runs were judged by the energies of different parts, so the common tr belongs to different switches",
         [_name_parts(row) for row in judged],
     )
+    if difference := describe_other_model(judged):
+        yield Caution("mixed-models", difference)
     for code in dict.fromkeys(code for row in judged for code in row.warnings):
         sources = [row.source for row in judged if code in row.warnings]
         yield Caution(
             code,
             f"in {len(sources)} of {format_number_of_runs(len(judged))}: {list_names(sources, most=NAMED)}",
         )
+
+
+def describe_other_model(rows: Sequence[StudyRow]) -> str:
+    """Return how the parts of a run differ from those of the first run with parts; empty if all have the same parts."""
+    with_parts = [row for row in rows if row.parts_in_files]
+    for row in with_parts[1:]:
+        if difference := _compare_parts(with_parts[0], row):
+            return f"the runs seem to belong to different models: {difference}; a study compares runs of one model"
+    return ""
+
+
+def _compare_parts(first: StudyRow, other: StudyRow) -> str:
+    """Return the first part that only one of two runs has, or whose title differs; empty if there is none."""
+    titles, titles_of_other = (
+        dict(part.partition(" ")[::2] for part in row.parts_in_files)
+        for row in (first, other)
+    )
+    for run, parts, others in (
+        (first, titles, titles_of_other),
+        (other, titles_of_other, titles),
+    ):
+        for id_, title in parts.items():
+            if id_ not in others:
+                named = f"{id_} {title!r}" if title else id_
+                return f"of {first.source} and {other.source}, only {run.source} has part {named}"
+    for id_, title in titles.items():
+        if is_different_title(title, titles_of_other[id_]):
+            return (
+                f"part {id_} is {title!r} in {first.source} and {titles_of_other[id_]!r} in "
+                f"{other.source}"
+            )
+    return ""
 
 
 def _warn_about_unusual_files(rows: Sequence[StudyRow]) -> Iterator[Caution]:

@@ -36,6 +36,7 @@ from d2rpick.histories.meaning import (
     find_meaning,
     find_quantity,
     is_time,
+    may_be_energy,
     refuse_other_quantity,
 )
 from d2rpick.histories.names import check_energy_unit, match_names, suggest_name
@@ -195,8 +196,17 @@ def find_internal_energy(
         count = "no column is"
     else:
         count = "the table has no line of headings, so no column is"
-    choices = energies or candidates
-    menu = _list_columns(layout, choices)
+    choices = energies or [
+        column
+        for column in candidates
+        if may_be_energy(layout.name(column), layout.unit(column))
+    ]
+    menu = _list_columns(layout, choices or candidates)
+    if not choices:
+        raise FormatError(
+            f"{source}: none of the columns is an energy by its name or unit: {menu}; write the internal energy too, "
+            "or give one of them as `energy` if it is one after all"
+        )
     raise EnergyChoiceError(
         f"{source}: {count} named like an internal energy; choose with `energy`: {menu}",
         tuple(str(column + 1) for column in choices),

@@ -24,6 +24,7 @@ from d2rpick.histories.formats.text import find_precisions, is_whole_field
 from d2rpick.histories.meaning import (
     find_internal_energies,
     is_time,
+    may_be_energy,
     refuse_other_quantity,
 )
 from d2rpick.histories.names import Selection, find_unit, resolve_name
@@ -179,7 +180,17 @@ class Curves(Database):
             count = f"{len(fitting)} curves are" if fitting else "no curve is"
             problem = f"{self.source}: {count} named like an internal energy"
             message = f"{problem}; choose with `energy`: {self._menu()}"
-            numbers = tuple(str(number + 1) for number in range(len(self.channels)))
+            choices = fitting or [
+                number
+                for number, name in enumerate(self.channels)
+                if may_be_energy(name)
+            ]
+            if not choices:
+                raise FormatError(
+                    f"{self.source}: none of the curves is an energy by its name: {self._menu()}; write the internal "
+                    "energy too, or give one of them as `energy` if it is one after all"
+                )
+            numbers = tuple(str(number + 1) for number in choices)
             raise EnergyChoiceError(message, numbers)
         if len(self.channels) == 1:
             refuse_other_quantity(self.channels[0], self.source)

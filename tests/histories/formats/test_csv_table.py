@@ -351,6 +351,21 @@ def test_curves_side_by_side_have_times_of_their_own() -> None:
             [],
             "no column is named like an internal energy.*2 'a', 3 'b'",
         ),
+        (
+            "time_s,reference_m,vz\n0,1,2\n1,2,3\n",
+            [],
+            "none of the columns is an energy by its name or unit: 2 'reference_m', 3 'vz'",
+        ),
+        (
+            "time,a,b\ns,mm,mm\n0,1,2\n1,2,3\n",
+            [],
+            "none of the columns is an energy by its name or unit: 2 'a', 3 'b'",
+        ),
+        (
+            "time,a,u_x_m\n0,1,2\n1,2,3\n",
+            [],
+            "choose with `energy`: 2 'a'$",
+        ),
         ("0,1,2\n1,2,3\n", [], "2 'column 2', 3 'column 3'"),
         (
             FOUR,

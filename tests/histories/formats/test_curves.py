@@ -197,6 +197,13 @@ def test_pairs_below_their_count_are_a_curve() -> None:
             [],
             "2 curves are named like an internal energy.*1 'A12: Internal Energy', 2 'B13: Internal Energy'",
         ),
+        (
+            CURVEPLOT.replace("Kinetic Energy #", "Velocity #").replace(
+                "Internal Energy", "Displacement"
+            ),
+            [],
+            "none of the curves is an energy by its name: 1 '",
+        ),
         (CURVEPLOT, ["3"], "no '3'; there are: A12"),
         (CURVEPLOT, ["A21: Internal Energy"], "did you mean 'A12: Internal Energy'"),
         (
