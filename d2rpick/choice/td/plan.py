@@ -446,7 +446,7 @@ def _warn_about_blocked(rows: Sequence[PlannedFlight]) -> Iterator[Caution]:
         and longest.rigid_time > first.rigid_time
     ):
         text = f"flight {longest.number} is rigid for {longest.rigid_time:.3g}, flight {first.number} before it for"
-        cure = "with `min_rigid` between the two the longer one is planned instead"
+        cure = "to plan the longer one instead, give a `min_rigid` between the two"
         yield Caution("longer-window-later", f"{text} {first.rigid_time:.3g}: {cure}")
 
 
