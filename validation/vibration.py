@@ -59,6 +59,7 @@ _CLEAR: Final = 2e-4  # states so near to td and to the landing are not compared
 
 _ROLL_PAIRS: Final = (
     (0.155716, 0.371906), (0.15527, 0.37225), (0.12851, 0.26421), (0.0957549, 0.372553), (0.10516, 0.37225),
+    (0.119556, 0.372923),
 )  # fmt: skip
 _CAR_PAIRS: Final = ((0.0386669, 0.146717), (0.0496, 0.1464), (0.1, 0.1464))
 _CAR_PARTS: Final = (

@@ -202,8 +202,8 @@ def follow(
 
     Examples
     --------
-    d2rpick follow --once --part box sample_data/rolloverT01.gz
-    d2rpick follow --for 2 -f ndjson sample_data/rolloverT01.gz
+    d2rpick follow --once --part box sample_data/rollover_box.matsum
+    d2rpick follow --for 2 -f ndjson sample_data/rollover_box.matsum
     """
     from d2rpick.api.running import follow as events
 

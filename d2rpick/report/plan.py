@@ -617,12 +617,12 @@ def list_plan_remarks(plan: RunPlan) -> list[tuple[str, str]]:
 
 
 def _list_position_errors(plan: RunPlan) -> list[tuple[str, str]]:
-    """Return the position errors that the remarks do not mention, if the table has no column for them."""
+    """Return the position errors other than 0 that the remarks do not mention, if the table has no column for them."""
     return [
         (f"flight {row.number}", f"out of place at td by {_format_place_error(row)}")
         for row in plan.flights
         if row.candidate
-        and row.candidate.position_error is not None
+        and row.candidate.position_error
         and not row.candidate.position_error_assumes
     ]
 

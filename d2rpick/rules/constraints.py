@@ -27,7 +27,7 @@ from d2rpick.rules.rule import (
 from d2rpick.rules.switched_parts import find_lead_parts
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Collection, Iterator, Mapping, Sequence
 
     from d2rpick.deck.card import CardField
     from d2rpick.deck.ls_dyna_parts import Constraint, Kind
@@ -123,14 +123,15 @@ def _find_flags(case: Case, card: SwitchSet) -> _Flags | None:
 class _Joining(NamedTuple):
     """A constraint and the parts that it joins.
 
-    ``deformable`` contains those of the ``parts`` that no card makes rigid. ``body_count`` is the number of rigid
-    bodies to which the other parts belong. ``flags`` contains NRBF and NCSF of the cards that make parts rigid, keyed
-    by part id.
+    ``deformable`` contains those of the ``parts`` that no card makes rigid, and ``always_rigid`` those with *MAT_RIGID.
+    ``body_count`` is the number of rigid bodies to which the parts that are not deformable belong. ``flags`` contains
+    NRBF and NCSF of the cards that make parts rigid, keyed by part id.
     """
 
     constraint: Constraint
     parts: frozenset[int]
     deformable: frozenset[int]
+    always_rigid: frozenset[int]
     body_count: int
     flags: Mapping[int, Sequence[_Flags]]
 
@@ -194,6 +195,7 @@ def _find_joinings(case: Case, kinds: Sequence[Kind]) -> Iterator[_Joining]:
                 constraint,
                 frozenset(parts),
                 frozenset(parts - leads.keys() - rigid),
+                frozenset(filter(case.parts.is_rigid, parts)),
                 len(bodies),
                 on_parts,
             )
@@ -224,6 +226,10 @@ def _find_active(
             cure = (
                 f"{held} ({rule_of_deleted}): make all its parts rigid, or none of them"
             )
+        elif not joining.is_one_body and joining.always_rigid:
+            held = _describe_always_rigid(joining.always_rigid)
+            merging = _advise_lead_part(joining)
+            cure = f"{held} ({rule_of_deleted}): {merging}, and {cure}; or keep {name_units(joining.flags)} deformable"
         elif not joining.is_one_body:
             held = f"its {name_units(joining.parts)} become separate rigid bodies"
             cure = f"{held} ({rule_of_deleted}): merge them by LRB, and {cure}"
@@ -242,11 +248,26 @@ def _find_separating(case: Case, kinds: Sequence[Kind]) -> Iterator[PlacedMessag
             verb = choose_verb(joining.deformable)
             left = f"{name_units(joining.deformable)} {verb} not made rigid"
             message = f"{problem}, but {left}; switch all"
+        elif joining.always_rigid:
+            held = _describe_always_rigid(joining.always_rigid)
+            merging = _advise_lead_part(joining)
+            message = f"{problem}, but {held}; {merging}, or keep {name_units(joining.flags)} deformable"
         else:
             message = (
                 f"{problem}, but they become separate rigid bodies; merge them by LRB"
             )
         yield joining.constraint.place, message
+
+
+def _describe_always_rigid(parts: Collection[int]) -> str:
+    """Describe parts that stay bodies of their own because they are rigid from the start."""
+    has = "has" if len(parts) == 1 else "have"
+    return f"{name_units(parts)} {has} *MAT_RIGID and cannot be switched"
+
+
+def _advise_lead_part(joining: _Joining) -> str:
+    """Advise to merge the switched parts into the part that is rigid from the start."""
+    return f"write LRB {min(joining.always_rigid)} on the line of {name_units(joining.flags)}"
 
 
 @set_passing(
@@ -298,7 +319,8 @@ def _check_separated_parts(case: Case) -> Iterator[PlacedMessage]:
     separate if they become several rigid bodies, or if one of them is not switched. Source: vendor keyword data for
     NRBF and LRB.
 
-    Fix: Switch all parts of the body and merge them by LRB, or switch none of them.
+    Fix: Switch all parts of the body and merge them by LRB, or switch none of them. If one of them has *MAT_RIGID, it
+    cannot be switched: write its id as LRB of the others.
     """
     return _find_separating(case, _NODAL)
 
@@ -336,7 +358,8 @@ def _check_other_constraints(case: Case) -> Iterator[PlacedMessage]:
     Fix: Set the flag to 1 on the card that makes the part rigid and to 2 on the card that switches it back: NCSF for
     spotwelds, rivets and node sets, NRBF for generalized welds. For joints and extra nodes, set NCSF, and NRBF too if
     they stay active in the run. If the constraint joins parts that do not become one rigid body, merge them by LRB
-    first (D2R121).
+    first (D2R121). A part with *MAT_RIGID cannot be switched: write its id as LRB of the part that it is joined to, or
+    keep that part deformable.
     """
     return _find_active(case, _OTHERS, "D2R121")
 

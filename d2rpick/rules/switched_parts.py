@@ -6,7 +6,11 @@ from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import name_units
 from d2rpick.base.graph import find_reachable
-from d2rpick.deck.ls_dyna_parts import DeckParts, find_element_cards
+from d2rpick.deck.ls_dyna_parts import (
+    DeckParts,
+    find_element_cards,
+    read_merged_bodies,
+)
 from d2rpick.rules.base import (
     BOTH,
     ERROR,
@@ -295,19 +299,23 @@ def _check_always_rigid(case: Case) -> Iterator[PlacedMessage]:
 @set_failing(
     lambda: [_make_touching_deck("1", "2"), _make_layered_deck(), _make_beam_deck()]
 )
-@make_rule_decorator(
-    "D2R108", ERROR, "several parts made rigid with LRB 0 although they share nodes"
-)
+@make_rule_decorator("D2R108", ERROR, "separate rigid bodies that share nodes (LRB)")
 def _check_shared_nodes(case: Case) -> Iterator[PlacedMessage]:
     """With LRB 0 each part becomes a rigid body of its own. If two rigid bodies share nodes, both prescribe the motion
-    of these nodes, which is a contradiction.
+    of these nodes, which is a contradiction. The same applies to a switched part that shares nodes with a part that has
+    *MAT_RIGID.
 
-    Fix: Merge the parts: the lead part has LRB 0, the other parts have LRB = id of the lead part.
+    Fix: Merge the parts: the lead part has LRB 0, the other parts have LRB = id of the lead part. A part with
+    *MAT_RIGID is not listed on the card: write its id as LRB of the parts that it shares nodes with.
     """
     first = {event.unit.id: event for event in reversed(case.made_rigid)}
-    if len(first) < 2:
+    if not first:
         return
-    bodies = find_lead_parts(first)
+    always_rigid = _find_always_rigid_bodies(case)
+    bodies = always_rigid | {
+        part: always_rigid.get(lead, lead)
+        for part, lead in find_lead_parts(first).items()
+    }
     cards = find_element_cards(case.deck, searched=True)
     if len(set(bodies.values())) < 2 or not cards:
         return
@@ -315,7 +323,15 @@ def _check_shared_nodes(case: Case) -> Iterator[PlacedMessage]:
     from d2rpick.deck.ls_dyna_inventory import find_shared_nodes
 
     for (low, high), node in find_shared_nodes(cards, bodies).items():
-        if _is_rigid_together(case, first[low].unit, first[high].unit):
+        switched = [part for part in (low, high) if part in first]
+        if len(switched) == 1:
+            (part,) = switched
+            lead = low + high - part
+            line = first[part].line
+            problem = f"part {part} becomes rigid and shares node {node} with part {lead}, which has *MAT_RIGID"
+            cure = f"merge it into that part (LRB {lead} on its line), or keep part {part} deformable"
+            yield (line.lead or line.part).field, f"{problem}; {cure}"
+        elif switched and _is_rigid_together(case, first[low].unit, first[high].unit):
             field = (first[high].line.lead or first[high].line.part).field
             lines = ((part, first[part].line) for part in (low, high))
             low_name, high_name = (
@@ -324,6 +340,23 @@ def _check_shared_nodes(case: Case) -> Iterator[PlacedMessage]:
             )
             problem = f"{low_name} and {high_name} share node {node} but become separate rigid bodies that both own it"
             yield field, f"{problem}; merge them: LRB {low} on the line of {high_name}"
+
+
+def _find_always_rigid_bodies(case: Case) -> dict[int, int]:
+    """Return the rigid body of each part with *MAT_RIGID, named after its lowest part.
+
+    The keyword *CONSTRAINED_RIGID_BODIES merges such parts.
+    """
+    pairs = [merged for _, merged in read_merged_bodies(case.deck)]
+
+    def find_merged(part: int) -> list[int]:
+        return [other for pair in pairs if part in pair for other in pair]
+
+    return {
+        part: min(find_reachable([part], find_merged))
+        for part in case.parts.material_by_part
+        if case.parts.is_rigid(part)
+    }
 
 
 def find_lead_parts(first: Mapping[int, SwitchEvent]) -> dict[int, int]:

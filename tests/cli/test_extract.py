@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings, strategies as st
+from hypothesis import assume, given, settings, strategies as st
 
-from d2rpick.base.errors import FormatError
+from d2rpick.base.errors import FormatError, HistoryError
 from d2rpick.histories.history import History
 from d2rpick.histories.opening import Selection, open_run
 from d2rpick.report.history_files import choose_history_format, write_table
@@ -95,7 +95,12 @@ def test_any_numbers_read_back_bit_for_bit(
     }
     for name, form in {"any.csv": "csv", "any.h5": "hdf5"}.items():
         file = put(tmp_path_factory.mktemp("any") / name, write_table(form, columns))
-        again = read_history([str(file)])
+        try:
+            again = read_history([str(file)])
+        except HistoryError as error:
+            # A value far beyond all others counts as damaged.
+            assume("in the single state" not in str(error))
+            raise
         assert again.time.tobytes() == columns["time"].tobytes()
         assert again.energy.tobytes() == columns["internal_energy"].tobytes()
 

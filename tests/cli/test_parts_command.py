@@ -271,3 +271,10 @@ def test_the_deck_that_a_plan_writes_merges_what_parts_merges(tmp_path: Path) ->
         "\n         2         1      PART\n"
         in (tmp_path / "next" / "switches.k").read_text()
     )
+
+
+def test_a_part_that_stays_in_place_gets_no_remark_on_its_position() -> None:
+    options = ("--part", "1", "--min-quality", "poor")
+    text = run("plan", "-q", *options, "--deck", str(DECK), MATSUM).stdout
+    assert "flight 1" in text
+    assert "out of place" not in text

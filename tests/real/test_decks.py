@@ -133,7 +133,7 @@ def test_legs_without_their_starter_deck_tell_main_nodes() -> None:
         (window.unit.id, window.unit.kind, window.tr, window.td)
         for window in checked.windows
     ] == [(450, "main node", 0.0, 0.05)]
-    assert checked.findings == ()
+    assert [finding.rule for finding in checked.findings] == ["D2R307"]
 
 
 # Elements.

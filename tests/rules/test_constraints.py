@@ -119,9 +119,17 @@ def test_extra_nodes_of_a_rigid_part_are_not_to_be_deleted_unless_it_leads(
 ) -> None:
     extra = "*CONSTRAINED_EXTRA_NODES_NODE\n" + pad(3, 4)
     (active,) = find_constraint_findings(tmp_path, extra, ["1"])
-    assert "its parts 1, 3 become separate rigid bodies" in active.message
+    cannot = "part 3 has *MAT_RIGID and cannot be switched"
+    assert cannot in active.message
+    assert "write LRB 3 on the line of part 1" in active.message
+    assert "or keep part 1 deformable" in active.message
     (deleted,) = find_constraint_findings(tmp_path, extra, ["1"], (0, 1))
     assert deleted.rule == "D2R121"
+    assert cannot in deleted.message
+    assert (
+        "write LRB 3 on the line of part 1, or keep part 1 deformable"
+        in deleted.message
+    )
     led = [pad(1, 3, "PART").rstrip("\n")]
     assert not find_constraint_findings(tmp_path, extra, led, (0, 1))
 

@@ -288,6 +288,35 @@ def test_shared_nodes_of_a_part_set_name_the_set(tmp_path: Path) -> None:
     )
 
 
+def test_a_switched_part_merges_with_the_always_rigid_part_whose_nodes_it_shares(
+    tmp_path: Path,
+) -> None:
+    """A part with *MAT_RIGID is not on the card, so only LRB joins a switched part to it."""
+    mesh = "*ELEMENT_SHELL\n" + "".join(
+        f"{part:8d}{part:8d}{node:8d}{3:8d}{8:8d}{9:8d}\n"
+        for part, node in ((1, 1), (3, 5))
+    )
+    anvil = "*PART\nanvil\n         3         1         7\n*MAT_RIGID\n         7\n"
+
+    merged = anvil.replace("         3  ", "         4  ")
+    merged += "*CONSTRAINED_RIGID_BODIES\n         4         3\n"
+
+    def find_shared(line: str, more: str = "") -> list[str]:
+        card = write_automatic_card(1, "0.02", rigid=[line])
+        deck = write(tmp_path, HEAD + PARTS + anvil + more + mesh + card + END)
+        findings = check_deck(deck).findings
+        return [found.message for found in findings if found.rule == "D2R108"]
+
+    (message,) = find_shared("1")
+    assert "part 1 becomes rigid and shares node" in message
+    assert "with part 3, which has *MAT_RIGID" in message
+    assert "LRB 3 on its line" in message
+    assert not find_shared("         1         3      PART")
+    assert not find_shared("         1         4      PART", merged)
+    assert find_shared("         1         4      PART", merged[: merged.index("*CON")])
+    assert not find_shared("2")
+
+
 def test_missing_lines_of_a_card_are_named(tmp_path: Path) -> None:
     lines = THERE.split("\n")
     without = {

@@ -243,7 +243,7 @@ def predict_residual_of_nodes(
 
 @pytest.mark.parametrize(
     ("case", "accuracy"),
-    [pytest.param("ROLL", 0.012, marks=pytest.mark.slow), ("FRAME", 0.022)],
+    [pytest.param("ROLL", 0.028, marks=pytest.mark.slow), ("FRAME", 0.022)],
 )
 def test_the_residuals_of_the_nodes_up_to_the_landing_follow_from_the_lines(
     case: str, accuracy: float
@@ -313,7 +313,7 @@ def test_the_docs_show_the_residuals_of_the_results() -> None:
     number = r"\**([-+]?[\d.]+)\**"
     rows = re.findall(rf"^\| `(ROLL|FRAME)`.*\| {number}, {number} \| [\d.]+ \| {number} \| {number} \| {number} \|$",
                       DOCS, re.MULTILINE)  # fmt: skip
-    assert len(rows) == 7
+    assert len(rows) == 8
     for case, *texts in rows:
         tr, td, *values = map(float, texts)
         near = (np.abs(1e3 * TOTALS["tr_s"] - tr) < 1e-3) & (
