@@ -216,8 +216,8 @@ def _describe_health(health: Health | None) -> str:
     """State that all energies written by the solver are within their limits."""
     if health is None or health.energy_ratio_min is None:
         return (
-            "the health of the run is unknown, because the files contain no energy balance "
-            "(LS-DYNA glstat, Radioss T01)"
+            "the health of the run is unknown, because the files contain neither the energy ratio nor the external "
+            "work (written to LS-DYNA glstat and Radioss T01)"
         )
     return "energies are within their usual limits"
 

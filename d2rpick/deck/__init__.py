@@ -102,6 +102,9 @@ def find_main_decks(folder: str, cure: str = "give the deck itself") -> list[str
         elif packed:
             reason = f"{packed} is packed"
             cure = "unpack it, for example with gunzip"
+        elif engine := next(filter(_is_engine_file, files), None):
+            reason = "only engine files, without their starter deck"
+            cure = f"add the starter deck, or give the engine file {engine}"
         else:
             reason = "no file with *KEYWORD or /BEGIN"
         raise DeckError(f"{folder}: no main deck in this folder ({reason}); {cure}")
@@ -129,6 +132,15 @@ def find_decks_of_run(folder: str) -> list[str]:
 def _is_packed_deck(path: str) -> bool:
     """Return True if the name is that of a packed deck, such as ``CAR_0000.rad.gz``."""
     return path.lower().endswith(_PACKED_DECKS)
+
+
+def _is_engine_file(path: str) -> bool:
+    """Return True if a file begins an engine run of Radioss."""
+    from d2rpick.deck.radioss_files import (
+        list_run_files,
+    )  # Imported here to keep start-up fast.
+
+    return path.lower().endswith(".rad") and bool(list_run_files(path))
 
 
 def _has_parts(path: str) -> bool:

@@ -46,7 +46,7 @@ def describe_expectation(decision: Decision) -> str:
         return decision.expected
     effect = ""
     if decision.allows_only_motion:
-        effect = "; its energy is small beside that of the next contact"
+        effect = "; its energy is small compared with that of the next contact"
     return f"{decision.expected}. At worst: {worst}{effect}"
 
 

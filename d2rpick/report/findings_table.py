@@ -164,7 +164,7 @@ def _rank_worst_finding(result: Checked) -> int:
 
 
 def _format_deck(checks: Checks, result: Checked) -> Iterator[str]:
-    """Yield the name of a deck, its rigid windows, and its findings, one in a line."""
+    """Yield the name of a deck, its rigid windows, and its findings, one in a line, the most severe ones first."""
     yield format_path(result.deck, checks.root)
     if _switches_at_unknown_times(result):
         yield "  switches itself by forces or sensors of the run; its times are not judged"
@@ -174,7 +174,9 @@ def _format_deck(checks: Checks, result: Checked) -> Iterator[str]:
         yield "  no part becomes rigid, although the deck has switching cards"
     for line in _format_windows(result.windows, checks.root):
         yield f"  {line}"
-    for finding in list_findings(checks, result):
+    for finding in sorted(
+        list_findings(checks, result), key=lambda finding: finding.severity.rank
+    ):
         yield f"  {format_finding(finding)}"
 
 

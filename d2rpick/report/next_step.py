@@ -94,10 +94,14 @@ def needs_deck(history: History, settings: Settings) -> bool:
 
 def name_step_to_deck(question: RepeatedQuestion) -> str:
     """Return a text with the command that writes a copy of the main deck with the cards of a plan."""
-    deck = name_deck_of_run(question, _NEEDS_DECK)
-    words = ("--deck", deck.name, "--write-deck", _FOLDER)
-    line = write_command(_allow_deck(question), "plan", *question.times, *words)
-    return f"write a copy of the deck with the cards: {line}{deck.hint}. Then run the deck in {_FOLDER} from t = 0"
+    words: tuple[str, ...] = ()
+    hint = ""
+    if "--deck" not in question.options:
+        deck = name_deck_of_run(question, _NEEDS_DECK)
+        words, hint = ("--deck", deck.name), deck.hint
+    words = (*question.times, *words, "--write-deck", _FOLDER)
+    line = write_command(_allow_deck(question), "plan", *words)
+    return f"write a copy of the deck with the cards: {line}{hint}. Then run the deck in {_FOLDER} from t = 0"
 
 
 def _allow_deck(question: RepeatedQuestion) -> RepeatedQuestion:

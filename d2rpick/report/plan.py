@@ -419,7 +419,9 @@ def _list_steps_for_record(
     step = f"{cards}. Then add them to the deck, and run the deck from t = 0"
     if cards.startswith("choose"):
         step = cards
-    elif needs_deck(plan.history, plan.settings):
+    elif needs_deck(plan.history, plan.settings) or (
+        plan.history.parts and "--deck" in question.options
+    ):
         step = name_step_to_deck(question)
     if written_deck:
         folder = written_deck.folder

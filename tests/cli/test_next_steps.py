@@ -595,6 +595,17 @@ def test_a_plan_of_a_record_that_ends_in_the_flight_asks_for_a_longer_run(
     assert "continue the run, because its record ends in the flight; if this" in step
 
 
+def test_a_plan_with_a_deck_proposes_its_copy(tmp_path: Path) -> None:
+    question = ("--part", "flying", "--deck", DECK, MATSUM)
+    step = find_line("next", "plan", *question)
+    line = step.partition("with the cards: d2rpick ")[2].partition(". Then")[0]
+    words = shlex.split(line)
+    assert words[:3] == ["plan", "--write-deck", "switched"]
+    words[2] = str(tmp_path / "switched")
+    assert run(*words).exit_code == 0
+    assert (tmp_path / "switched" / "rollover_box.k").exists()
+
+
 def test_a_plan_names_the_option_strict_that_excludes_every_pair() -> None:
     step = find_line("next", "plan", "--strict", "--energy", "boxIE_J", ROLLOVER)
     assert step.startswith(

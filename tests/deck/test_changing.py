@@ -294,6 +294,15 @@ def test_a_deck_that_changes_all_the_time_is_an_error(
     assert find_main_decks(str(tmp_path)) == [path]  # the file is not skipped
 
 
+def test_an_engine_file_alone_in_a_folder_is_named(tmp_path: Path) -> None:
+    engine = tmp_path / "car_0001.rad"
+    engine.write_text("/RUN/car/1\n0.01\n/END\n")
+    with pytest.raises(
+        DeckError, match=r"only engine files.*or give the engine file .*car_0001\.rad$"
+    ):
+        find_main_decks(str(tmp_path))
+
+
 def test_a_pipe_gives_its_bytes_once_and_hangs_no_folder(tmp_path: Path) -> None:
     main, pipe = write(tmp_path, GOOD), tmp_path / "pipe.k"
     os.mkfifo(pipe)

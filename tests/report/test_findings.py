@@ -57,9 +57,9 @@ def test_table(results: list[Checked], tmp_path: Path) -> None:
     assert lines[lines.index("") + 1] == "main.k"
     assert "  part 1: rigid from 0.02 to 0.5 (main.k:14)" in lines
     assert "  part 2: rigid from 0.02 to the end (main.k:14)" in lines
-    assert any(
-        line.startswith("  main.k:23:28: error D2R101 TIME1 is 0.5") for line in lines
-    )
+    found = [line for line in lines if line.startswith("  main.k:")]
+    assert found[0].startswith("  main.k:23:28: error D2R101 TIME1 is 0.5")
+    assert ": info D2R104 " in found[1]
     assert (
         lines[-1]
         == "1 error, 0 warnings, 1 info message in 2 decks; times not judged: no `history`"

@@ -154,8 +154,8 @@ def _warn_about_flight(situation: Situation) -> Iterator[Caution]:
         ):
             waited = f"{flight.start - flight.settled:.3g}"
             text += (
-                f" (the energy settles at {flight.settled:.6g}; to be safe, d2rpick waits for another {waited}, a third "
-                f"of the time until td = {td:.6g})"
+                f" (the energy settles at {flight.settled:.6g}; to be safe, d2rpick waits for another {waited}, a "
+                f"third of the time until td = {td:.6g})"
             )
         yield Caution(
             "flight-from-energy", f"{text}; if you know it, give it as `after`"

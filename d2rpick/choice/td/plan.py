@@ -333,10 +333,10 @@ def _suggest_window(
             start=known_flight.start, source=known_flight.source
         )
         row = row._replace(flight=flight, start=known_flight.start)
-        if known_flight.source == "energy" and answer.recommended:
-            _, end = known_flight.within(reference.history.time)
+        if known_flight.source == "energy" and known_flight.end is not None:
             flight = flight._replace(end=known_flight.end)
-            row = row._replace(flight=flight, end=end)
+            margin = find_margin(reference.history, flight, flight_settings)
+            row = row._replace(flight=flight, end=known_flight.end, margin=margin)
     if answer.recommended is None:
         return row._replace(reason=answer.why_none)
     if answer.recommended.rigid_time < shortest:
@@ -446,7 +446,7 @@ def _warn_about_blocked(rows: Sequence[PlannedFlight]) -> Iterator[Caution]:
         and longest.rigid_time > first.rigid_time
     ):
         text = f"flight {longest.number} is rigid for {longest.rigid_time:.3g}, flight {first.number} before it for"
-        cure = "with `min_rigid` between the two the longer one is planned instead"
+        cure = "to plan the longer one instead, give a `min_rigid` between the two"
         yield Caution("longer-window-later", f"{text} {first.rigid_time:.3g}: {cure}")
 
 
