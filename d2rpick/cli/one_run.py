@@ -263,10 +263,10 @@ def explore(
 ) -> None:
     """Show the best tr, the error and the rigid time for each td.
 
-    In --td-window, or in the longest flight, d2rpick compares evenly spaced values of td, and every peak of the energy.
-    It judges each td as `suggest --td` does.  The table lists the Pareto-optimal pairs: no other pair has a smaller
-    error with at least the same rigid time, or a longer rigid time with at most the same error.  d2rpick also names the
-    nearest td with half the error.
+    d2rpick compares evenly spaced values of td, and every peak of the energy.  They lie in --td-window or, by default, in
+    the flight that contains --td, otherwise in the longest flight.  Each td is judged as by `suggest --td`.  The table
+    lists the Pareto-optimal pairs: no other pair has a smaller error with at least the same rigid time, or a longer
+    rigid time with at most the same error.  d2rpick also names the nearest td with half the error.
 
     Examples
     --------
@@ -291,8 +291,8 @@ def explore(
     )
     times = options.write_times(td=td, td_window=td_window)
     output.answer(answer, question=question.repeated._replace(times=times))
-    chosen = answer.recommended
-    decision = chosen.decision if chosen else None
+    shown = answer.shown
+    decision = shown.decision if shown else None
     _finish_answer(output, question, decision, question.settings.min_quality)
 
 
