@@ -114,14 +114,19 @@ class Word(click.Choice[str]):
 
     def get_invalid_choice_message(self, value: Any, ctx: click.Context | None) -> str:
         """Return the message on a wrong word."""
-        from d2rpick.histories.names import suggest_name
+        from difflib import get_close_matches
 
-        near = suggest_name(str(value), self.choices)
-        return f"{super().get_invalid_choice_message(value, ctx).rstrip('.')}{near}"
+        near = get_close_matches(str(value).lower(), self.choices, n=1)
+        hint = f" (did you mean {near[0]!r}?)" if near else ""
+        return f"{super().get_invalid_choice_message(value, ctx).rstrip('.')}{hint}"
 
 
 class WholeNumber(click.IntRange):
     """A whole number within its limits."""
+
+    def get_metavar(self, *_: Any, **__: Any) -> str:
+        """Return the name of a value, as shown in the help."""
+        return "N"
 
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
