@@ -136,7 +136,7 @@ def list_next_step(
     trade_off: TradeOff, question: RepeatedQuestion
 ) -> list[tuple[str, str]]:
     """Return the next command, which leads to the card of the requested or chosen pair, otherwise to a better pair."""
-    offer = trade_off.requested or trade_off.recommended
+    offer = trade_off.shown
     decision = trade_off.decide_on(offer) if offer else None
     situation = offer.answer.situation if offer else trade_off.situation
     if offer is None or offer.tr is None or decision is None:
@@ -203,8 +203,6 @@ def _list_choice_if_td_is_free(
     best = trade_off.recommended
     if best is None or best is requested or best.decision is None:
         return []
-    if is_refused(best.decision):
-        return [("if td is free", "no other td of the range has a usable pair either")]
     return [
         ("if td is free", f"{best.decision.verdict}: {_describe_offer(best)}"),
     ]
@@ -408,7 +406,7 @@ def build_offer_table(
     `list_offer_reasons` explains the numbers beside the verdicts.
     """
     numbers = _number_offer_reasons(offers)
-    first = trade_off.requested or trade_off.recommended
+    first = trade_off.shown
     columns = {
         "": lambda offer: "*" if offer is first else " ",
         **{

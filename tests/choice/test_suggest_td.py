@@ -31,6 +31,7 @@ from tests.energies import (
     suggest_in_window,
 )
 from tests.reading import read, read_solved
+from tests.records import make_mode, make_table, sum_energies
 
 PLAIN = Settings()
 T01 = str(ROLLOVER).replace(".csv", "T01.gz")
@@ -420,3 +421,21 @@ def test_all_formats_of_a_run_give_one_pair() -> None:
         (best,) = [row for row in answer["candidates"] if row["recommended"]]
         pairs.append((best["tr"], answer["td"]))
     assert pairs == [pytest.approx(pairs[0], rel=1e-3)] * len(pairs)
+
+
+def test_a_long_window_is_not_chosen_if_only_a_shorter_one_keeps_the_vibration() -> (
+    None
+):
+    """Before, the only window longer than half the flight was chosen although its vibration was lost."""
+    time = np.linspace(0.0, 0.378, 420)
+    modes = [
+        make_mode(np.array([164.3, 1.963, 1.938, 0.952])),
+        make_mode(np.array([170.2, 0.661, 1.373, 0.155])),
+    ]
+    answer = suggest_in_window(
+        make_table(time, sum_energies(modes, time)), None, Settings(after=0.0)
+    )
+    pair = require(answer.recommended)
+    assert require(pair.residual) < 0.5
+    longer = require(answer.longer)
+    assert require(longer.residual) > 0.5

@@ -1,6 +1,7 @@
 """A trade-off gives every td the same answer as ``suggest``, and marks exactly the Pareto-optimal offers."""
 
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,11 +11,13 @@ from d2rpick.choice.answers import suggest_at, suggest_in_history, suggest_in_ru
 from d2rpick.choice.pair.quality import rank_candidates
 from d2rpick.choice.pair.situation import examine_td
 from d2rpick.choice.question import Settings
+from d2rpick.choice.td.flights import find_flights
 from d2rpick.choice.td.trade_off import Offer, TradeOff, explore_run
 from d2rpick.histories.digits import round_as_read
 from d2rpick.histories.history import History
 from d2rpick.histories.names import Selection
 from tests.command import ROOT
+from tests.drops import drop, write_run_files
 from tests.energies import forget, make_energy_history, make_reference, require
 from tests.reading import read
 
@@ -278,3 +281,17 @@ def test_a_level_that_stays_the_same_is_graded_alike_at_each_td() -> None:
         if offer.quality and offer.best and not offer.best.same_swing
     }
     assert grades == {"poor"}  # no evidence of the deformation
+
+
+@pytest.mark.slow
+def test_a_td_is_compared_with_others_of_its_own_flight(tmp_path: Path) -> None:
+    """Before, it was compared with the td of the longest flight."""
+    box = read(write_run_files(drop(), tmp_path), Selection(parts=("box",)))
+    plain = Settings(replay=False, min_quality="poor")
+    flights = find_flights(box.history, plain)
+    assert len(flights) > 1
+    for flight in flights:
+        start, end = flight.within(box.history.time)
+        td = (start + end) / 2
+        window = explore_run(box, plain, td=td, steps=10).td_window
+        assert start <= window[0] < td < window[1] <= end

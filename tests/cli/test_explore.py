@@ -294,3 +294,17 @@ def test_a_table_names_each_reason_once_below_it() -> None:
         f"({number})" for number in range(9)
     }
     assert all("wrong by" not in row for row in table)
+
+
+def test_the_exit_code_and_its_message_belong_to_the_verdict_in_the_first_line() -> (
+    None
+):
+    """Before, they belonged to the pair that d2rpick would choose if td were free."""
+    poor = run("explore", "--td", "0.0657", *WINDOW, ENERGY)
+    assert poor.stdout.startswith("do not use ")
+    assert poor.exit_code == 1
+    assert "the verdict is 'do not use'" in poor.stderr
+    assert "if td is free  use: " in poor.stdout
+    good = run("explore", "--td", "0.0687534", *WINDOW, ENERGY)
+    assert good.stdout.startswith("use ")
+    assert good.exit_code == 0

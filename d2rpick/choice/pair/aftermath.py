@@ -27,7 +27,7 @@ from d2rpick.flight.margin import compute_energy_of_approach
 from d2rpick.vibration.measures import BAND_DEVIATIONS, wrong_sign
 
 if TYPE_CHECKING:
-    from d2rpick.choice.pair.candidates import Candidate
+    from d2rpick.choice.pair.candidates import Candidate, Pair
     from d2rpick.choice.pair.situation import Situation
     from d2rpick.flight.flight import Flight
     from d2rpick.histories.history import History
@@ -215,7 +215,7 @@ class Worth(NamedTuple):
 
 
 def compare_error_with_contact(
-    situation: Situation, candidate: Candidate
+    situation: Situation, candidate: Candidate | Pair
 ) -> Worth | None:
     """Compare the vibration error of a pair with the energy of the next contact; None if either is unknown.
 

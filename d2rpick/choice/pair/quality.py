@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from d2rpick.choice.pair.aftermath import Worth
-    from d2rpick.choice.pair.candidates import Candidate, Judged
+    from d2rpick.choice.pair.candidates import Candidate, Judged, Pair
     from d2rpick.choice.pair.moving_apart import MovingApart
     from d2rpick.choice.pair.situation import Situation
     from d2rpick.histories.history import History, Samples
@@ -471,6 +471,16 @@ def grade_pair(
         else _raise_grade_by_worth(alone, worth)
     )
     return Quality(motion, counted, alone, worth)
+
+
+def is_vibration_lost(situation: Situation, pair: Candidate | Pair) -> bool:
+    """Return True if the residual of a pair is poor and its error matters in the next contact."""
+    if pair.residual is None or pair.residual <= POOR_RESIDUAL:
+        return False
+    worth = compare_error_with_contact(situation, pair)
+    if worth is None or situation.settings.keep_vibration:
+        return True
+    return worth.share > MOST_WORTH_OF_FAIR
 
 
 def _raise_grade_by_worth(alone: Grade, worth: Worth | None) -> Grade:

@@ -40,9 +40,10 @@ def find_longest_flight(
     history: History,
     settings: Settings,
     *,
+    around: float | None = None,
     otherwise: tuple[float, float] | None = None,
 ) -> tuple[float, float]:
-    """Return the longest flight of the record as a range for td [time].
+    """Return the longest flight of the record, or the flight that contains ``around``, as a range for td [time].
 
     If only the energy shows the flight, its end may depend on td; the range then excludes the margin. If there is no
     flight, ``otherwise`` is returned.
@@ -85,8 +86,13 @@ def find_longest_flight(
             cure = "if you know the end of the load, give it as `after`"
         raise RangeError(f"{', '.join(history.source)}: {reason}; {cure}")
     windows = [(flight.within(history.time), flight) for flight in flights]
+    containing = [
+        (window, flight)
+        for window, flight in windows
+        if around is not None and window[0] < around <= window[1]
+    ]
     (start, end), longest = max(
-        windows,
+        containing or windows,
         key=lambda window_and_flight: window_and_flight[0][1] - window_and_flight[0][0],
     )
     latest = compute_last_td(end, find_margin(history, longest, settings).time)

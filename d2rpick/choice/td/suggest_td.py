@@ -16,6 +16,7 @@ from d2rpick.choice.pair.quality import (
     ROUNDING,
     get_limit_of_like_quality,
     is_good_residual,
+    is_vibration_lost,
     is_within_band,
     rank_candidates,
     rate_certainty_of_tr,
@@ -462,7 +463,7 @@ def _choose_by_modes(
     The energy at td does not matter. Of the long windows that are good, one of nearly the longest is used, because a
     longer rigid time is worth more than a still smaller residual. If no long window is good, a shorter good window is
     used. If there is no good window, the result is the longest of the long windows that may be as good as the best one,
-    given its error band.
+    given its error band. A window after which the vibration is lost is used only if this is true of all windows.
     """
     compared = situation.vibration.compared
     start = situation.earliest_tr
@@ -483,8 +484,10 @@ def _choose_by_modes(
         return _choose_by_residual(situation, window, look)
     if good:
         return _get_td(_find_longest(good)), _get_td(_find_longest(pairs))
+    # However long a window is, it is not worth the loss of a vibration that a shorter window keeps.
+    kept = [pair for pair in pairs if not is_vibration_lost(*pair)] or pairs
     least_time = _LEAST_RIGID[0] * (last - first)
-    long = [pair for pair in pairs if pair[1].rigid_time >= least_time] or pairs
+    long = [pair for pair in kept if pair[1].rigid_time >= least_time] or kept
     alike = _find_longest(_select_within_band(long))
     return _get_td(alike), _get_td(_find_longest(pairs))
 

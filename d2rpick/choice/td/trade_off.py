@@ -190,6 +190,11 @@ class TradeOff:
     step: Offer | None = None
 
     @property
+    def shown(self) -> Offer | None:
+        """The offer whose verdict is the answer: that for the requested td, or else the recommended one."""
+        return self.requested or self.recommended
+
+    @property
     def more_accurate(self) -> Offer | None:
         """The proposal with the smallest error; None if it is the recommended one or its error is of another kind."""
         recommended = self.recommended
@@ -234,7 +239,8 @@ def explore_run(
     reference : Reference
     settings : Settings
     td_window : (float, float), optional
-        Window for td [time].  The default is the longest flight or, if there is none and td is given, the whole record.
+        Window for td [time].  The default is the flight that contains td, or else the longest flight; if there is no
+        flight and td is given, it is the whole record.
     td : float, optional
         Requested td, with which others are compared [time].
     steps : int
@@ -252,7 +258,7 @@ def explore_run(
     refuse_unsound(history, settings, td)
     record = history.start, history.end
     window = td_window or find_longest_flight(
-        history, settings, otherwise=None if td is None else record
+        history, settings, around=td, otherwise=None if td is None else record
     )
     if td_window is None:
         history.check(*window, subject="the longest flight,")
