@@ -255,10 +255,9 @@ def test_warnings_are_those_that_apply() -> None:
 def test_the_comments_ask_only_for_flags_that_the_constraints_allow() -> None:
     comments = join_comments(print_cards(ONE, MERGED).text)
     assert (
-        "Only if none of them also connects to a part that is not switched, set NRBF or NCSF to 1 (delete)"
-        in comments
+        "If none also joins an unswitched part, set NRBF, NCSF 1 (delete)" in comments
     )
-    assert "Leave RWF 0, and end the window before the contact with a wall." in comments
+    assert "End the window before a wall (RWF 0)." in comments
 
 
 def test_the_comments_allow_to_plan_later_flights_from_a_switched_run() -> None:
