@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 # Names used in messages for quantities whose names differ from their keys.
 _QUANTITIES: Final = {"kinetic_share": "kinetic fraction"}
 # Help for ``min_quality``, to which each command appends its default.
-MIN_QUALITY: Final = "Lowest grade that is not reported as a problem (exit code 1)."
+MIN_QUALITY: Final = "Exit with 1 if the grade is lower than this (poor: do not use, fair: use with care, good: use)."
 
 
 class Limit(NamedTuple):
@@ -108,28 +108,29 @@ class ChoiceOptions:
         metadata=_describe_use(of_cards=True),
     )
     landing: float | None = make_option(
-        "Time of the next contact after the flight; td lies at least one margin before it.  "
+        "Time of the next contact after the flight; td is at least one margin earlier.  "
         "[default: found from the record]",
         TIME,
         "T",
         metadata=_describe_use(of_cards=True),
     )
     margin: float | None = make_option(
-        "Time kept free after the load and before the next contact.  [default: 0 after the load; before the contact "
-        "derived from flight and vibration, but only if d2rpick chooses td or you give `landing`]",
+        "Time kept free after the load and before the next contact.  [default: none after the load. Before the "
+        "contact: chosen from the flight and the vibration; none if you give `td` without `landing`]",
         NOT_NEGATIVE,
         "T",
         metadata=_describe_use(of_cards=True),
     )
     tolerance: float = make_option(
-        "Largest frozen-deformation error, or level error with the basis energy; no effect with the basis modal.",
+        "Largest error allowed in the deformation kept at tr or, with the basis energy, in its level. Not used with "
+        "the basis modal.",
         FRACTION,
         "L",
         default=0.2,
         metadata=_describe_use(of_cards=True),
     )
     max_kinetic_share: float | None = make_option(
-        "Reject a td with a larger kinetic fraction.",
+        "Reject a td at which a larger fraction of the vibration energy is kinetic.",
         NOT_NEGATIVE,
         "K",
         metadata=_describe_use(
@@ -153,13 +154,13 @@ class ChoiceOptions:
         metadata=_describe_use(is_advanced=True),
     )
     strict: bool = make_option(
-        "Recommend nothing if only the energy shows when the load ends.",
+        "Recommend no pair if the end of the load is known from the energy alone.",
         "flag",
         default=False,
         metadata=_describe_use(),
     )
     keep_vibration: bool = make_option(
-        "Grade the vibration by the residual alone, even if the next contact has far more energy.",
+        "Grade the vibration strictly: do not forgive an error because the next contact has far more energy.",
         "flag",
         default=False,
         metadata=_describe_use(),
@@ -170,7 +171,7 @@ class ChoiceOptions:
         metadata=_describe_use(of_cards=True, of_sets=False),
     )
     cost_share: float | None = make_option(
-        "Fraction of the CPU time of a time step that is saved while the parts are rigid, to predict the saving.",
+        "Fraction of the CPU time of a step saved while the parts are rigid, to predict the saving.",
         FRACTION,
         "C",
         metadata=_describe_use(of_sets=False, is_advanced=True),

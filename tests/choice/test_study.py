@@ -275,7 +275,7 @@ def test_a_run_that_was_cut_is_called_so(tmp_path: Path) -> None:
     ends = f"{short} (ends early, at 0.06), {late} (ends early, at 0.1)"
     assert (
         messages["cut-runs"]
-        == f"2 of 5 runs were cut, or end earlier than most: {ends}"
+        == f"2 of 5 runs were cut, or end earlier than the others: {ends}"
     )
     assert find_cut_runs([*rows[:3], replace(rows[0], warnings=("truncated-input",))])[
         0

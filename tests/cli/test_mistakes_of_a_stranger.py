@@ -457,3 +457,12 @@ def test_a_time_in_milliseconds_is_named_in_a_deck(tmp_path: Path) -> None:
     deck = write_switching_deck(tmp_path, "*DEFORMABLE_TO_RIGID_AUTOMATIC", 1, 12.5)
     answer = " ".join(run("check", "--select", "D2R101", deck).stdout.split())
     assert "was it meant in ms? Then write 0.0125, in the unit of ENDTIM" in answer
+
+
+def test_a_run_that_is_left_out_of_a_study_does_not_shorten_the_others(
+    tmp_path: Path,
+) -> None:
+    """Before, the judged run was said to be cut, because the run that was left out is longer."""
+    rows = "".join(f"{step / 1000},{step}\n" for step in range(300))
+    rise = str(put(tmp_path / "rise.csv", f"time,internal_energy\n{rows}".encode()))
+    assert "cut-runs" not in run("study", ENERGY, rise).stderr

@@ -391,7 +391,9 @@ def _find_common_interval(rows: Sequence[StudyRow]) -> tuple[list[float], float,
 def find_cut_runs(rows: Sequence[StudyRow]) -> list[StudyRow]:
     """Return the runs that were cut off: their files end within a state, or their records are unusually short."""
     read_to = [(row, row.record_end) for row in rows if row.record_end is not None]
-    whole = median_high(end for _, end in read_to) if read_to else 0.0
+    # A run that could not be judged, such as one of another load case, does not show how long the others should be.
+    ends = [end for row, end in read_to if row.judged]
+    whole = median_high(ends) if ends else 0.0
     return [
         row
         for row, end in read_to
@@ -569,7 +571,7 @@ def _warn_about_unusual_files(rows: Sequence[StudyRow]) -> Iterator[Caution]:
         count = f"{len(cut)} of {format_number_of_runs(len(rows))}"
         yield Caution(
             "cut-runs",
-            f"{count} were cut, or end earlier than most: {list_names(cut, most=NAMED)}",
+            f"{count} were cut, or end earlier than the others: {list_names(cut, most=NAMED)}",
         )
 
 
