@@ -263,9 +263,9 @@ def explore(
 ) -> None:
     """Show the best tr, the error and the rigid time for each td.
 
-    d2rpick compares evenly spaced values of td, and every peak of the energy.  They lie in --td-window or, by default, in
-    the flight that contains --td, otherwise in the longest flight.  Each td is judged as by `suggest --td`.  The table
-    lists the Pareto-optimal pairs: no other pair has a smaller error with at least the same rigid time, or a longer
+    d2rpick compares evenly spaced values of td, and every peak of the energy.  They lie in --td-window or, by default,
+    in the flight that contains --td, otherwise in the longest flight.  Each td is judged as by `suggest --td`.  The
+    table lists the Pareto-optimal pairs: no other pair has a smaller error with at least the same rigid time, or a longer
     rigid time with at most the same error.  d2rpick also names the nearest td with half the error.
 
     Examples
