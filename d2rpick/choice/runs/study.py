@@ -391,7 +391,9 @@ def _find_common_interval(rows: Sequence[StudyRow]) -> tuple[list[float], float,
 def find_cut_runs(rows: Sequence[StudyRow]) -> list[StudyRow]:
     """Return the runs that were cut off: their files end within a state, or their records are unusually short."""
     read_to = [(row, row.record_end) for row in rows if row.record_end is not None]
-    whole = median_high(end for _, end in read_to) if read_to else 0.0
+    # A run that could not be judged does not show how long the runs of the study should be.
+    judged = [end for row, end in read_to if row.judged]
+    whole = median_high(judged) if judged else 0.0
     return [
         row
         for row, end in read_to
