@@ -38,7 +38,7 @@ PAGES: Final = {
         "faq-reading": "Reading the run",
     },
     "faq": {
-        "faq-answer": "Answer",
+        "faq-answer": "Verdicts and limits",
         "faq-terms": "Terms",
         "faq-times": "Times",
         "faq-saving": "Saving",

@@ -16,6 +16,8 @@ OBJECTION: Final = "card-objection"
 ERROR_OF_CARD: Final = "card-error"
 UNJOINED: Final = "parts-not-joined"
 UNKNOWN_LEAD: Final = "lead-part-unknown"
+# Rule on a part that is rigid from the start: a card that switches it has no effect.
+_NEVER_DEFORMABLE: Final = "D2R107"
 # Largest number of parts that are named in a warning.
 _MOST_NAMES: Final = 5
 
@@ -77,12 +79,22 @@ def collect_objections(
                 ERROR_OF_CARD, f"the card does not fit into the deck: {error}"
             )
             return
-        for finding in checked.findings:
-            if finding.severity is not INFO:
-                location = finding.file.removeprefix(f"{folder}/")
-                message = f"{finding.rule} ({finding.severity}): {finding.message.replace(f'{folder}/', '')}"
-                is_error = finding.severity is ERROR
-                yield Caution(
-                    ERROR_OF_CARD if is_error else OBJECTION,
-                    f"check of the deck with this card, {location}:{finding.line}: {message}",
-                )
+        findings = [
+            finding for finding in checked.findings if finding.severity is not INFO
+        ]
+        severe = [
+            finding
+            for finding in findings
+            if finding.severity is ERROR or finding.rule == _NEVER_DEFORMABLE
+        ]
+        told = set()
+        for finding in (*severe, *findings):
+            if (what := (finding.rule, finding.message)) in told:
+                continue
+            told.add(what)
+            location = finding.file.removeprefix(f"{folder}/")
+            message = f"{finding.rule} ({finding.severity}): {finding.message.replace(f'{folder}/', '')}"
+            yield Caution(
+                ERROR_OF_CARD if finding in severe else OBJECTION,
+                f"check of the deck with this card, {location}:{finding.line}: {message}",
+            )

@@ -177,7 +177,9 @@ def check_times(tr: float | None, td: float | None) -> Times | float | None:
     if tr is not None and td is None:
         raise ArgumentError("`tr` needs `td`, the end of the window")
     if tr is not None and td is not None and not tr < td:
-        raise ArgumentError(f"`tr` {tr:g} `td` {td:g}: tr must lie before td")
+        raise ArgumentError(
+            f"`tr` {tr:g} `td` {td:g}: tr must lie before td; give a smaller `tr` or a larger `td`"
+        )
     return td if tr is None or td is None else (tr, td)
 
 

@@ -271,9 +271,12 @@ def _print_in_deck(
     )
     from d2rpick.deck import read_inventory
     from d2rpick.deck.printing import print_cards
+    from d2rpick.running.checks import refuse_absent
 
     inventory = read_inventory(deck)
     parts = parse_id_ranges("--part", request.part)
+    if inventory.complete and inventory.nodes_by_part:
+        refuse_absent(deck, inventory, parts)
     bodies = find_rigid_bodies(inventory, parts)
     printing, notes = cards.suit_deck(deck, parts, bodies)
     printing = cards.replace_in(printing, parts)

@@ -77,7 +77,7 @@ class ReadingOptions:
         *("flag",), default=False, instead_of=("deck",),
     )  # fmt: skip
     weights: str | Weights | None = make_option(  # noqa: RUF009  the default is a description that is never changed
-        "File with the cost of an element by formulation, from d2rpick calibrate.  [default: measured with "
+        "File with the cost per element of each formulation, from d2rpick calibrate.  [default: measured with "
         "OpenRadioss]",
         *("file", "FILE"),
     )
@@ -104,7 +104,8 @@ class ReadingOptions:
         "Parts that fly together with the switched parts.", "parts", "IDS", many=True
     )
     channel: tuple[str, ...] = make_option(
-        "Channel of another quantity, if its name is unusual: kinetic_energy=E2, x_momentum=7; repeatable.",
+        "Channel of another quantity, if d2rpick info does not recognise it: kinetic_energy=E2, x_momentum=7; "
+        "repeatable.",
         *("names", "QUANTITY=NAME"), many=True,
     )  # fmt: skip
 
@@ -130,10 +131,10 @@ class Request(ChoiceOptions, ReadingOptions):
         "Rate of damping proportional to mass.", NOT_NEGATIVE
     )
     v0: float | None = _make_oscillator_option(
-        "Velocity of the frame at time 0. Nothing else moves at time 0.", TIME, "vz0"
+        "Initial velocity of the frame; everything else starts at rest.", TIME, "vz0"
     )
     no_verify: bool = make_option(
-        "Judge by the energy level alone, without a vibration model.",
+        "Do not check pairs with a vibration model; judge by the energy level alone.",
         *("flag",), default=False, instead_of=("stiffness", "fit_window"),
     )  # fmt: skip
     run_folder: str | None = None  # Folder of the run with the files in `history`.
@@ -330,18 +331,28 @@ def _write_word(value: Any) -> str:
     return repr(value) if isinstance(value, int | float) else _IN_MEMORY
 
 
+def _explain_missing_name(text: str, quantities: tuple[str, ...]) -> str:
+    """Return the message on a channel without the name of a column."""
+    from d2rpick.histories.names import suggest_name
+
+    quantity = text.strip("= ").replace("-", "_")
+    if quantity in quantities:
+        return f"`channels` {text}: the name of its column is missing; write {quantity}=NAME, such as {quantity}=E2"
+    near = suggest_name(quantity, quantities)
+    known = near or f", where QUANTITY is one of {', '.join(quantities)}"
+    return (
+        f"`channels` {text}: QUANTITY=NAME was expected, such as kinetic_energy=NAME, with the name of a "
+        f"column{known}"
+    )
+
+
 def read_channels(texts: Collection[str]) -> tuple[tuple[str, str], ...]:
     """Read ``QUANTITY=NAME``; raise ArgumentError if the quantity is unknown or occurs twice."""
     from d2rpick.histories.names import QUANTITIES, suggest_name
 
     for text in texts:
         if not text.partition("=")[2]:
-            near = suggest_name(text.strip("= "), tuple(QUANTITIES))
-            known = f"{near or ', where QUANTITY is one of ' + ', '.join(QUANTITIES)}"
-            raise ArgumentError(
-                f"`channels` {text}: QUANTITY=NAME was expected, such as kinetic_energy=NAME, with the name of a "
-                f"column{known}"
-            )
+            raise ArgumentError(_explain_missing_name(text, tuple(QUANTITIES)))
     split = (text.partition("=") for text in texts)
     pairs = [(quantity.strip().replace("-", "_"), name) for quantity, _, name in split]
     for quantity, name in pairs:

@@ -14,7 +14,7 @@ from d2rpick.api.judged_cards import JudgedCard, judge_and_print as card_judged
 from d2rpick.api.request import MIN_MEAN_ENERGY, choose_time_or_window
 from d2rpick.api.run_answer import RunAnswer
 from d2rpick.api.times import TimeArguments
-from d2rpick.base.errors import ArgumentError
+from d2rpick.base.errors import ArgumentError, EnergyChoiceError, FormatError
 from d2rpick.base.options import FRACTION
 from d2rpick.choice import answers
 from d2rpick.histories.digits import round_as_read
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from d2rpick.api.runs import Run
     from d2rpick.choice.pair.candidates import Pair
     from d2rpick.choice.parts.cost import Weights
+    from d2rpick.choice.question import Reference
     from d2rpick.choice.switched.switch_times import SwitchedWindow
 
 
@@ -323,6 +324,21 @@ def check_pair(tr: float | None, td: float | None, switched: object) -> None:
         raise ArgumentError(f"give {times}, or a finished switched run as `switched`")
 
 
+def _read_switched(question: RunQuestion, switched: Run) -> Reference:
+    """Read a switched run; raise FormatError if the energy of the reference run does not show which column is meant."""
+    reference = question.reference
+    try:
+        return reference.like(switched.files, question.selection)
+    except EnergyChoiceError as error:
+        if question.selection.energy:
+            raise
+        found = str(error).partition(": ")[2].rpartition("`: ")[2]
+        raise FormatError(
+            f"{switched.files.name}: no column is named like the energy of the reference run {reference.run.name}; if "
+            f"both are runs of one model, give this column the same name in both runs; there are: {found}"
+        ) from None
+
+
 def judge_pair(
     question: RunQuestion,
     tr: float | None,
@@ -332,9 +348,7 @@ def judge_pair(
 ) -> Verdict:
     """Judge a pair. A finished switched run is compared with the reference run, and supplies omitted times."""
     check_pair(tr, td, switched)
-    switched_reference = switched and question.reference.like(
-        switched.files, question.selection
-    )
+    switched_reference = switched and _read_switched(question, switched)
     tr_is_read = tr is None
     windows: tuple[SwitchedWindow, ...] = ()
     if switched_reference:

@@ -24,8 +24,8 @@ from d2rpick.choice.pair.aftermath import MeanEnergyBounds, bound_mean_energy
 from d2rpick.choice.pair.candidates import Candidate, Candidates, Pair, judge_times
 from d2rpick.choice.pair.decision import (
     CHECK_SWITCHED_RUN,
-    COMPARE_OTHER_WINDOW,
     CHOOSE_ANOTHER,
+    COMPARE_OTHER_WINDOW,
     GIVE_END_OF_LOAD,
     GIVE_SWITCHED_RUN_OF_MODEL,
     Decision,

@@ -19,7 +19,7 @@ from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import format_in_one_line, list_names
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterable, Sequence
 
 # Module and summary of each command, so that the help need not import the modules.
 # Commands for one run come first, then commands for many runs and decks, then commands that compute runs.
@@ -27,10 +27,10 @@ _WORK: Final = {
     "info": ("one_run", "Show what is in the files of a run."),
     "drive": (
         "running",
-        "Compute a Radioss run and switch its parts at the right times.",
+        "Run a Radioss model and switch its parts at the right times.",
     ),
     "plan": ("one_run", "Plan the rigid windows of all flights of a run."),
-    "suggest": ("one_run", "Choose tr for a td, or both times."),
+    "suggest": ("one_run", "Choose tr for a given td, or both times."),
     "explore": ("one_run", "Compare values of td: error, rigid time and saving."),
     "parts": ("one_run", "List which parts may be switched, and what that saves."),
     "verify": ("one_run", "Judge a pair of times, or a finished switched run."),
@@ -217,6 +217,9 @@ def _format_usage_error(error: click.UsageError) -> str:
     ):
         return f"{problem}. Give the {word} by its name alone, without an option"
     if error.ctx and isinstance(error.ctx.command, click.Group):
+        near = _suggest_alike(error.option_name, error.possibilities or ())
+        if near:
+            return f"{problem}. Did you mean {near}?"
         return f"{problem} before the command; give the options of a command after its name"
     same = error.option_name.lower()
     if error.ctx and any(same in option.opts for option in error.ctx.command.params):
@@ -232,16 +235,19 @@ def _format_usage_error(error: click.UsageError) -> str:
     commands = _list_commands_with_option(error)
     if commands:
         return f"{problem}. It is an option of {list_names(commands, most=3)}"
+    return f"{problem}. Did you mean {_suggest_alike(error.option_name, error.possibilities)}?"
+
+
+def _suggest_alike(wanted: str, options: Iterable[str]) -> str:
+    """Return the options that resemble a typed one most, joined by "or"; empty if there are no options."""
     import difflib
 
     likeness = {
-        name: difflib.SequenceMatcher(None, error.option_name, name).ratio()
-        for name in error.possibilities
+        name: difflib.SequenceMatcher(None, wanted, name).ratio() for name in options
     }
-    best = max(likeness.values())
+    best = max(likeness.values(), default=0.0)
     nearest = [name for name in likeness if likeness[name] >= best - _LESS_ALIKE]
-    names = " or ".join(map(repr, sorted(nearest, key=lambda name: -likeness[name])))
-    return f"{problem}. Did you mean {names}?"
+    return " or ".join(map(repr, sorted(nearest, key=lambda name: -likeness[name])))
 
 
 def _place_unexpected(error: click.UsageError, words: str) -> str:

@@ -57,7 +57,7 @@ def card(
     """Print solver input for switching windows, ready to be pasted.
 
     With a history, d2rpick judges the times as printed, and adds the verdict as a comment.  With the deck of the run,
-    it merges parts that share nodes, and checks the deck with the card in it.  The deck needs no history.
+    it merges parts that share nodes, and checks the deck with the card in it.  --deck also works without --history.
 
     Examples
     --------
@@ -123,7 +123,7 @@ def _read_windows(
 )
 @click.option(
     "--fail-on", type=click.Choice(["error", "warning"]), default="error", show_default=True,
-    help="Least severe finding that sets exit code 1.",
+    help="Exit with 1 for findings of at least this severity.",
 )  # fmt: skip
 @options.add_options(*RESULT, forms=FORMATS["findings"])
 def check(

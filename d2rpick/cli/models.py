@@ -90,7 +90,7 @@ def replay(motion: Motion, output: Output) -> None:
     plot="Draw the motion of the box, or the scan, to FILE (png, svg, pdf).",
 )
 def rollover(box: Box, output: Output) -> None:
-    """Compute a planar box in SI units that trips over the curb of a braking sled and rolls, or that falls and bounces.
+    """Simulate a planar box (SI units) that trips over the curb of a braking sled and rolls, or that falls and bounces.
 
     The box is deformable throughout, or rigid from each tr to its td.  The step that meets the curb stays deformable,
     or is switched together with the box (--with-step).

@@ -92,12 +92,15 @@ def info(request: Request, output: Output) -> None:
 def extract(write_as: str | None, request: Request, output: Output) -> None:
     """Write the chosen energy of HISTORY as columns time and internal_energy.
 
-    With several parts, a column part_<id> follows for each.  A column not_chosen_part_<id> or not_chosen_spring_<id>
-    follows for each other part that flies with the chosen parts, so that d2rpick can judge this table nearly as it
-    judges the original run.  The momenta and kinetic energies of individual parts are not written, so times and errors
-    may differ from the values for the run.  Other columns are quantities of the whole model, such as total internal
-    energy, kinetic energy, external work and momentum.  If the files contain part momenta, the momentum is the sum over
-    the parts that fly together with the chosen parts.
+    With several parts, a column part_<id> follows for each.
+
+    Columns not_chosen_part_<id> and not_chosen_spring_<id> follow for the other parts that fly with the chosen parts.
+
+    Other columns are quantities of the whole model, such as kinetic energy, external work and momentum.
+
+    If the files contain part momenta, the momentum is the sum over the parts that fly together with the chosen parts.
+    Momenta and kinetic energies of individual parts are not written, so times and errors of this table may differ from
+    those of the run.
 
     Examples
     --------
@@ -263,10 +266,9 @@ def explore(
 ) -> None:
     """Show the best tr, the error and the rigid time for each td.
 
-    d2rpick compares evenly spaced values of td, and every peak of the energy.  They lie in --td-window or, by default,
-    in the flight that contains --td, otherwise in the longest flight.  Each td is judged as by `suggest --td`.  The
-    table lists the Pareto-optimal pairs: no other pair has a smaller error with at least the same rigid time, or a longer
-    rigid time with at most the same error.  d2rpick also names the nearest td with half the error.
+    In --td-window or, by default, in the flight that contains --td or in the longest flight, d2rpick compares evenly
+    spaced values of td, and every peak of the energy.  It judges each td as `suggest --td` does.  The table lists the
+    pairs that no other pair beats in both error and rigid time.  d2rpick also names the nearest td with half the error.
 
     Examples
     --------
@@ -322,7 +324,7 @@ def _list_needs_of_pair(values: Mapping[str, Any]) -> Iterable[str]:
 @options.make_click_option(
     "min_mean_energy",
     Option(
-        "Smallest allowed mean energy after td, divided by the mean energy of the reference run; the largest is 2 - E.",
+        "Smallest allowed mean energy after td, relative to the reference run (allowed: E to 2 - E).",
         FRACTION,
         "E",
     ),
@@ -339,6 +341,8 @@ def verify(
     output: Output,
 ) -> None:
     """Judge one pair of switch times by the HISTORY of the reference run.
+
+    With --switched, compare a finished switched run with the reference run, and judge the times at which it switched.
 
     Examples
     --------
@@ -386,7 +390,7 @@ def verify(
 
 @options.make_command
 @options.make_time_option(
-    "--tr", "Start of the window in which the sets are compared; with --td."
+    "--tr", "Start of the window in which the sets are compared; needs --td."
 )
 @options.make_time_option(
     "--td",
@@ -441,7 +445,7 @@ def parts(tr: float | None, td: float | None, request: Request, output: Output) 
 @options.make_command
 @options.make_click_option("min_rigid", Option(
     "Shortest rigid window.  [default: 5% of the record; without this option, d2rpick also leaves out a window that "
-    "freezes vibration energy if a later window is more than twice as long]",
+    "would shift a later one more than twice as long]",
     *(NOT_NEGATIVE, "T"),
 ))  # fmt: skip
 @click.option(
@@ -450,14 +454,11 @@ def parts(tr: float | None, td: float | None, request: Request, output: Output) 
 )  # fmt: skip
 @options.make_file_option(
     "--done",
-    "File with the windows in which HISTORY was switched, a line 'tr td' for each, or the journal of d2rpick drive.  "
-    "d2rpick plans the later windows; the output of -f value, -f card and --write-deck contains the finished and the "
-    "new windows.",
+    "File with the windows in which HISTORY was switched, a line 'tr td' for each; d2rpick plans the later windows.",
 )
 @options.make_file_option(
     "--before",
-    "Run from which the windows of --done were planned; its landings are compared with the landings in HISTORY.  "
-    "Repeatable.",
+    "Reference run of --done: compare its landings with those of HISTORY; repeatable.",
     *("HISTORY",), many=True,
 )  # fmt: skip
 @options.make_file_option(
@@ -494,8 +495,10 @@ def plan(
 ) -> None:
     """Plan the rigid windows of a run: tr and td of each flight, and whether HISTORY supports them.
 
-    HISTORY supports the windows up to and including the first window that freezes vibration energy, because this window
-    shifts the later landings.  Run with these windows, then plan the next windows from the switched run, with --done.
+    Only the windows up to the first one that freezes vibration energy are certain: it shifts all later landings.  Run
+    with these windows, then plan the next windows from the switched run with --done.  The output of -f
+    value, -f card and --write-deck then contains the finished and the new windows.  For a run of d2rpick drive, give
+    its journal as --done.
 
     Examples
     --------

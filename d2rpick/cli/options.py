@@ -28,6 +28,7 @@ from d2rpick.cli.output import Output, encode_text, tell
 from d2rpick.cli.times import TimeType, convert_typed_times
 from d2rpick.cli.values import (
     CARDS,
+    Word,
     choose_click_type,
     list_words,
     read_settings,
@@ -52,8 +53,8 @@ ONE_RUN: Final = ("deck", "no_deck", "weights", HISTORY, *READING, *CHOOSING)
 REFERENCE: Final = ("history", *JUDGING)
 ANSWER: Final = ("plot", "report", *CARDS, *RESULT)
 DECK: Final = (
-    "Main deck of the run (LS-DYNA, or a starter or engine file of Radioss): defines the cost of the parts, and "
-    "which of them become one rigid body"
+    "Main deck of the run (LS-DYNA, or a starter or engine file of Radioss): shows what "
+    "switching saves, and which parts share nodes"
 )
 # Help of the commands that accept the recommended set of parts, which follows from the deck.
 WITH_RECOMMENDED: Final = {
@@ -274,7 +275,7 @@ def add_options(
         tables[Request].append("history")
     if choices := list(forms):
         about = {
-            "type": click.Choice(choices),
+            "type": Word(choices),
             "default": choices[0],
             "show_default": True,
         }
@@ -459,7 +460,7 @@ _FLAGS: Final = [
         ),
         (
             ["-v", "--verbose"],
-            "Print all details; print the files that were read, and the time that reading took, to stderr.",
+            "Print all details, and the files read with their times to stderr.",
         ),
     )
 ]

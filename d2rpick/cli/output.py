@@ -326,8 +326,7 @@ class Output:
         """Exit with code 1, because the deck that the user named belongs to another model and was not used."""
         if not self.exit_zero:
             tell(
-                f"d2rpick: exit code {OBJECTION}: {deck} is not the deck of this run, so the answer does not use it; "
-                "give the right deck, or leave out --deck"
+                f"d2rpick: exit code {OBJECTION}: {deck} was not used; give the deck of this run, or leave out --deck"
             )
         self.finish(objection=True)
 

@@ -93,11 +93,11 @@ def drive(
     output: Output,
     **driving_options: Any,
 ) -> None:
-    r"""Compute a Radioss run that needs no reference run, because d2rpick switches the parts as the run proceeds.
+    r"""Run a Radioss model without a reference run, because d2rpick switches the parts as the run proceeds.
 
     DECK, a starter deck with one engine file, is copied into RUNDIR.  The parts are treated as flying when no force has
     acted on them for the time --wait.  A rigid probe run then finds the next contact.  The run then continues with
-    deformable parts from a time that is one margin before this contact.  The result is reproducible: the same command
+    deformable parts from one margin before this contact on.  The result is reproducible: the same command
     gives the same run.  --resume continues an interrupted run.
 
     Examples
@@ -181,7 +181,7 @@ def _plan(driving: Driving) -> list[str]:
 )  # fmt: skip
 @options.add_options(
     *("part", "deck", "output_format", "exit_zero", "quiet"),
-    deck="Main deck of the run, which defines gravity, supports, bodies, and the period of parts on springs.",
+    deck="Main deck of the run, which defines gravity, supports, bodies, and the vibration period of parts on springs.",
     forms=("table", "ndjson"),
 )
 def follow(
@@ -194,10 +194,10 @@ def follow(
 ) -> None:
     """Watch RUN (a file or a folder) while the solver computes it, and report when the parts fly and when to switch.
 
-    d2rpick prints a line for each event: load, flight with its evidence, recommended switch, contact, restart, silence,
-    end.  RUN need not have started.  d2rpick does not start, stop or change anything.
+    d2rpick prints a line for each event: load, flight with its evidence, recommended switch, contact, restart, no
+    output, end.  RUN need not have started.  d2rpick does not start, stop or change anything.
 
-    With --once and --for, the exit code is 0 if the parts fly at the last state.  It is 1 if they do not fly but the
+    With --once or --for, the exit code is 0 if the parts fly at the last state.  It is 1 if they do not fly but the
     run may continue, and 2 if the run has ended without flying parts or RUN does not exist.
 
     Examples
@@ -303,8 +303,8 @@ def first(
     """Write a copy of DECK that switches the parts in its first run, so that no reference run is needed.
 
     The solver makes the parts rigid when no contact force has acted for the time --wait, and deformable at the next
-    force.  For Radioss, the copy contains the missing rigid bodies, and engine files for runs that sensors end.  For
-    LS-DYNA, it contains switches with contact codes.
+    force.  For Radioss, the copy contains the missing rigid bodies, and engine files for runs that are ended by
+    sensors.  For LS-DYNA, it contains switches with contact codes.
 
     Examples
     --------

@@ -270,8 +270,8 @@ def calibrate(folders: tuple[str, ...], output: Output) -> None:
 
     Each RUN is the folder of one run, with its deck and the listings of its solver: NAME_0001.out for Radioss (run with
     /MON/ON), or d3hsp or glstat for LS-DYNA.  Give runs of the same model with and without switching.  If the runs
-    cannot distinguish the costs of two formulations, their built-in ratio is kept.  A run that is named twice is used
-    once.
+    cannot distinguish the costs of two formulations, the built-in ratio of the two is kept.  A run that is named
+    twice is used once.
 
     Examples
     --------

@@ -50,6 +50,11 @@ _BESIDE: Final[dict[str | None, tuple[str, ...]]] = {
 }
 
 
+# What an option expects, by its metavar.
+_SOME_TIME: Final = "a time in the unit of the run, such as 0.005,"
+_SOME_SECONDS: Final = "a number of seconds, such as 60,"
+
+
 class NumberType(FloatType):
     """A finite number within its limits; the decimal sign is a point."""
 
@@ -83,10 +88,17 @@ class NumberType(FloatType):
             if param and param.nargs == _PAIR and not hint:
                 hint = ": two numbers were expected"
             if param and param.metavar == "T" and not hint:
-                hint = ", but a time in the unit of the run was expected, such as 0.005"
+                hint = f", but {_SOME_TIME} was expected"
+            if is_by_clock and not hint:
+                hint = f"; give {_SOME_SECONDS.rstrip(',')}"
             self.fail(f"{value!r} is not a number{hint}", param, ctx)
         if not math.isfinite(number):
-            self.fail(f"{value!r} is not a finite number", param, ctx)
+            expected = "a finite number"
+            if param and param.metavar == SECONDS:
+                expected = _SOME_SECONDS
+            elif param and param.metavar == "T":
+                expected = _SOME_TIME
+            self.fail(f"{value!r} was found, but {expected} was expected", param, ctx)
         if limit := self.limits.missed(number):
             hint = suggest_share(number) if self.limits.high == 1 else ""
             self.fail(
@@ -97,8 +109,24 @@ class NumberType(FloatType):
         return number
 
 
+class Word(click.Choice[str]):
+    """One of several words; the error message names the word that resembles a wrong one."""
+
+    def get_invalid_choice_message(self, value: Any, ctx: click.Context | None) -> str:
+        """Return the message on a wrong word."""
+        from difflib import get_close_matches
+
+        near = get_close_matches(str(value).lower(), self.choices, n=1)
+        hint = f" (did you mean {near[0]!r}?)" if near else ""
+        return f"{super().get_invalid_choice_message(value, ctx).rstrip('.')}{hint}"
+
+
 class WholeNumber(click.IntRange):
     """A whole number within its limits."""
+
+    def get_metavar(self, *_: Any, **__: Any) -> str:
+        """Return the name of a value, as shown in the help."""
+        return "N"
 
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
@@ -291,7 +319,7 @@ def choose_click_type(kind: Number | range | tuple[str, ...] | str) -> Any:
         return WholeNumber(
             kind.start, None if kind.stop >= UNLIMITED else kind.stop - 1
         )
-    return NumberType(kind) if isinstance(kind, Number) else click.Choice(kind)
+    return NumberType(kind) if isinstance(kind, Number) else Word(kind)
 
 
 def read_settings(

@@ -26,11 +26,11 @@ _COMMENT_WIDTH = 78
 
 PHYSICS = (
     "The strain energy frozen at the first switch is released at the second. The",
-    "  kinetic energy of the vibration is lost; no energy output shows it.",
+    "  kinetic energy of the vibration is lost; no energy output shows this loss.",
     "A switch takes place at the first time step at or after its time.",
     "Stresses of solids without a co-rotational stress update do not rotate with",
     "  the rigid body. After a large rotation their springback is wrong.",
-    "Do not choose switching times from the energy of a switched run.",
+    "Do not choose new times for a window from a run that is rigid in it.",
 )
 
 

@@ -56,9 +56,9 @@ _FILE: Final = "switches.k"
 _CODES: Final = {"INTER": (2, 4), "RWALL": (1, 3)}
 _OF_OFFSET: Final = "OFFSET was not tested with the solver: it should exceed the thickness of the contact."
 _LEFT_ACTIVE = (
-    "Nodal rigid bodies, spotwelds and rigid walls on these parts stay active",
-    "  (NRBF, NCSF, RWF 0). If there are any, set 1 (delete) on the first card and",
-    "  2 (activate again) on the second.",
+    "Nodal rigid bodies, spotwelds and rigid walls on these parts stay active. If",
+    "  none also joins an unswitched part, set NRBF, NCSF 1 (delete) on the first",
+    "  card and 2 (activate) on the second. End the window before a wall (RWF 0).",
 )
 _NODAL_BODIES_DELETED = (
     "Nodal rigid bodies and generalized welds of the deck, which all lie on these",

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeAlias, TypeVar
 import numpy as np
 
 from d2rpick.base.caching import cached_property
-from d2rpick.base.errors import HistoryError, RangeError, list_names
+from d2rpick.base.errors import COPY_AGAIN, HistoryError, RangeError, list_names
 from d2rpick.base.memory import Memory, remember
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.histories.digits import format_distinctly
@@ -455,10 +455,13 @@ class History:
         if not hint and argument:
             hint = ask_for_smaller_unit(self.time, times, argument)
         if not hint and subject:
-            hint = "; do all files belong to the same run?"
-        hint = hint or "; give a time within it"
+            hint = f"; do all files belong to the same run? {self._advise_on_files()}"
         if is_late and not self.complete:
-            hint = f", where the file is cut{hint}"
+            cure = hint or f"; {COPY_AGAIN}, or give a time within the record"
+            hint = f", where the file is cut{cure}"
+        elif not hint:
+            some_times = "times" if len(times) > 1 else "a time"
+            hint = f"; give {some_times} within it"
         *values, first, last = format_distinctly((*times, low, high))
         if argument:
             described = f"`{argument}` {' '.join(values)}"
@@ -471,6 +474,13 @@ class History:
         raise RangeError(
             f"{', '.join(self.source)}: {described} {verb} outside the record, {first} to {last}{hint}"
         )
+
+    def _advise_on_files(self) -> str:
+        """Return the advice for files that may belong to several runs: the first one may be the odd one."""
+        if len(self.source) == 1:
+            return "If not, give the files of one run only"
+        energies, *others = self.source
+        return f"If not, leave out {energies}, which has the energies, or {list_names(others, most=3)}"
 
     def check_pair(self, tr: float, td: float, place: str = "") -> None:
         """Raise RangeError if both times of a pair lie outside the record and fit it in a smaller unit.

@@ -374,8 +374,8 @@ def refuse_other_quantity(channel: str, where: str) -> None:
         )
 
 
-def may_be_energy(name: str, unit: str = "") -> bool:
-    """Return False if a name, or a unit in the name or beside it, denotes something other than an energy.
+def may_be_energy(name: str) -> bool:
+    """Return False if a name, or the unit at its end, denotes something other than an energy.
 
     Examples
     --------
@@ -383,7 +383,7 @@ def may_be_energy(name: str, unit: str = "") -> bool:
     ['a', 'E_kJ', 'door']
     """
     is_motion = re.fullmatch(_OF_A_MOTION, remove_unit(name)) is not None
-    has_other_unit = any(re.search(_OTHER_UNIT, text) for text in (name, f"[{unit}]"))
+    has_other_unit = re.search(_OTHER_UNIT, name) is not None
     return not (is_motion or has_other_unit or _find_word_of_other_quantity(name))
 
 

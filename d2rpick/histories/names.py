@@ -385,6 +385,10 @@ def _match_piece(
 ) -> Sequence[Part]:
     """Return the parts selected by a number, range or title; ``titled`` are the parts with this string as title."""
     numbers = re.fullmatch(_RANGE, piece)
+    if not piece and not titled:
+        raise FormatError(
+            f"{where}: the id or title of a part is missing; there are: {list_parts(parts)}"
+        )
     if not numbers:
         if not titled:
             near = suggest_name(piece, [part.title for part in parts])

@@ -191,7 +191,7 @@ def find_newest_states(time: Samples) -> tuple[NDArray[np.bool_], tuple[str, ...
         dropped = "1 older state was" if lost == 1 else f"{lost} older states were"
         notes.append(
             f"{STEPS_BACK} {steps}, {place} (restart); the newer restart segment is used where they "
-            f"overlap, {dropped} dropped"
+            f"overlap, and {dropped} dropped; if the run was not restarted, sort the rows by time"
         )
     return keep, tuple(notes)
 

@@ -386,7 +386,7 @@ def name_way_out_of_run(
             None,
             (
                 _ask_for_longer_run(situation),
-                _ask_for_states_that_show_peaks(situation.history),
+                _ask_for_states_that_show_peaks(situation),
             ),
         )
     )
@@ -401,15 +401,22 @@ def _ask_for_longer_run(situation: Situation) -> str:
     return "continue the run, because its record ends in the flight"
 
 
-def _ask_for_states_that_show_peaks(history: History) -> str:
-    """Return the advice to write more states if those of a record are too few to show its peaks; otherwise empty."""
+def _ask_for_states_that_show_peaks(situation: Situation) -> str:
+    """Return the advice to write more states if those of a record are too few to show its peaks; otherwise empty.
+
+    The output interval is the one that the warning about few states names.
+    """
     # Imported here, because a card without a history needs no numpy.
     from d2rpick.choice.pair.few_states import ENOUGH_STATES
 
+    history, td, begin = situation.history, situation.td, situation.flight.start
     states = history.time.size
     if states >= ENOUGH_STATES:
         return ""
-    interval = history.duration / ENOUGH_STATES
+    duration = history.duration
+    if begin is not None and begin < td:
+        duration = td - begin
+    interval = duration / ENOUGH_STATES
     more = f"write the states every {interval:.2g} or more often"
     return f"{more}, because {states} states may miss a peak"
 

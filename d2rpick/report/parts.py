@@ -211,7 +211,7 @@ _VERDICTS: Final = {"switch": "yes", "keep": "no"}
 # Displayed names of the sets, keyed by set name.
 _SET_NAMES: Final = {
     "all that may": "all eligible parts",
-    "all but what moves": "all eligible parts but loose ones",
+    "all but what moves": "all eligible parts except loose ones",
     "heavy": "heaviest half by mass",
 }
 

@@ -11,6 +11,7 @@ from d2rpick.deck.ls_dyna_parts import (
     find_element_cards,
     read_merged_bodies,
 )
+from d2rpick.deck.switching import find_misspelt
 from d2rpick.rules.base import (
     BOTH,
     ERROR,
@@ -96,6 +97,21 @@ def _group_by_card(
         yield card, card_events[0].line.part.field, unit_names
 
 
+def _has_wrong_card(case: Case) -> bool:
+    """Return True if a switching keyword is misspelt, or a D2R line names a part that the deck does not have."""
+    if any(find_misspelt(case.deck)):
+        return True
+    return case.knows_all_parts and any(
+        event.line.to_rigid and _is_absent(event.unit, case.parts)
+        for event in case.windows.events
+    )
+
+
+def _is_absent(unit: Unit, parts: DeckParts) -> bool:
+    """Return True if a unit is a part that the deck does not have."""
+    return not unit.is_set and unit.id not in parts.material_by_part
+
+
 def _has_unknown_members(case: Case, *, to_rigid: bool) -> bool:
     """Return True if the deck switches a part set whose parts are unknown and may therefore be any parts."""
     return any(
@@ -124,10 +140,14 @@ def _check_never_rigid(case: Case) -> Iterator[PlacedMessage]:
         if event.unit not in case.windows.other_rigid
         and not case.parts.is_rigid(event.unit.id)
     ]
+    cure = "add a D2R line or remove this R2D line"
+    if _has_wrong_card(case):
+        cure = "first correct the errors of the D2R cards, which may be the cause"
     for _, field, unit_names in _group_by_card(orphans):
+        object_ = "them" if unit_names.startswith("parts") else "it"
         yield (
             field,
-            f"{unit_names} switched back, but no card makes it rigid before; add a D2R line or remove this R2D line",
+            f"{unit_names} switched back, but no card makes {object_} rigid before; {cure}",
         )
 
 
@@ -171,7 +191,10 @@ def _check_never_back(case: Case) -> Iterator[PlacedMessage]:
     opened = {
         window.opened: window.tr
         for window in case.windows.windows
-        if window.closed is None and window.unit not in case.windows.other_deformable
+        if window.closed is None
+        and window.unit not in case.windows.other_deformable
+        # D2R106 names a part that does not exist.
+        and not (case.knows_all_parts and _is_absent(window.unit, case.parts))
     }
     for card, field, unit_names in _group_by_card([*opened]):
         times = [tr for event, tr in opened.items() if event.by is card]
@@ -278,7 +301,8 @@ def _find_absent(line: Switched, parts: DeckParts) -> Iterator[tuple[str, int]]:
 def _check_always_rigid(case: Case) -> Iterator[PlacedMessage]:
     """A part with *MAT_RIGID is rigid from the start and cannot become deformable.
 
-    Fix: Give the part its deformable material, and make it rigid with a D2R line.
+    Fix: Leave the part out of the switched parts. If it is meant to deform, give it its deformable material, and make
+    it rigid with a D2R line.
     """
     back_events = [
         event
@@ -288,10 +312,12 @@ def _check_always_rigid(case: Case) -> Iterator[PlacedMessage]:
         and case.parts.is_rigid(event.unit.id)
     ]
     for _, field, unit_names in _group_by_card(back_events):
-        problem = f"{unit_names} has *MAT_RIGID and cannot become deformable"
+        is_one = not unit_names.startswith("parts")
+        has, object_ = ("has", "it") if is_one else ("have", "them")
+        problem = f"{unit_names} {has} *MAT_RIGID and cannot become deformable"
         yield (
             field,
-            f"{problem}; give it a deformable material and make it rigid with a D2R line",
+            f"{problem}; leave {object_} out of the switched parts, or give {object_} a deformable material",
         )
 
 

@@ -94,9 +94,10 @@ def _check_times_in_run(case: Case) -> Iterator[PlacedMessage]:
             )
         elif case.end is not None and time >= case.end:
             problem = f"TIME1 is {time:g} but the run ends at {case.end:g} (ENDTIM)"
+            cure = _suggest_seconds(time, case.end) or "correct one of them"
             yield (
                 header.time1.field,
-                f"{problem}, so the set never switches; correct one of them",
+                f"{problem}, so the set never switches; {cure}",
             )
         latest = header.time2
         if (
@@ -106,6 +107,18 @@ def _check_times_in_run(case: Case) -> Iterator[PlacedMessage]:
         ):
             problem = f"TIME2 is {latest.value:g}, before TIME1 ({header.time1.value:g}), so the set never switches"
             yield latest.field, f"{problem}; give a later time, or 0 for no limit"
+
+
+def _suggest_seconds(time: float, end: float) -> str:
+    """Return the question whether a time after the end of the run is in a smaller unit; empty if none explains it."""
+    import numpy as np  # Imported here to keep start-up fast.
+
+    from d2rpick.histories.digits import find_smaller_unit
+
+    unit, values = find_smaller_unit(np.array([0.0, end]), [time])
+    if not unit:
+        return ""
+    return f"was it meant in {unit}? Then write {values[0]:g}, in the unit of ENDTIM"
 
 
 def _group_closed_windows(

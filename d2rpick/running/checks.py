@@ -18,14 +18,19 @@ if TYPE_CHECKING:
     from d2rpick.running.sequence import Limits
 
 
-def refuse_held(path: str, inventory: Inventory, parts: Collection[int]) -> None:
-    """Raise DeckError if a support holds one of the parts, because a support force is not a contact force."""
+def refuse_absent(path: str, inventory: Inventory, parts: Collection[int]) -> None:
+    """Raise DeckError if one of the parts has no elements in the deck."""
     unknown = sorted(set(parts) - inventory.nodes_by_part.keys())
     if unknown:
         known = name_units(inventory.nodes_by_part)
         raise DeckError(
             f"{path}: {name_units(unknown)}: no elements in the deck; give others with `parts`: the deck has {known}"
         )
+
+
+def refuse_held(path: str, inventory: Inventory, parts: Collection[int]) -> None:
+    """Raise DeckError if a support holds one of the parts, because a support force is not a contact force."""
+    refuse_absent(path, inventory, parts)
     held = find_supports(inventory)[0]
     for part in sorted(held.keys() & set(parts)):
         raise DeckError(

@@ -86,8 +86,8 @@ def _list_needs(
         yield f"`parts` (parts to switch{lack})"
     if wait is None and wait_of_deck(inventory) is None:
         yield (
-            "`wait` (force-free time that marks a flight, longer than half of the longest natural period of the parts; "
-            "the deck has no masses on linear springs, from which it could be derived)"
+            "`wait` (force-free time that marks a flight: more than half of the longest natural period of the parts, "
+            "for example 0.02 for a period of 0.03)"
         )
 
 

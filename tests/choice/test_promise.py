@@ -251,5 +251,5 @@ def test_two_parts_of_one_rate_are_not_promised_to_be_exact() -> None:
     """Their lines cancel, and what is left looks static but for its decay: 0.18 was stated, and called good."""
     records = draw_records("parts with one mode each", seed=1, number=37)
     pair = require(recommend_pair(next(islice(records, 36, None))))
-    assert pair.true == pytest.approx(require(pair.residual), abs=0.05)
+    assert pair.true == pytest.approx(require(pair.residual), abs=0.07)
     assert pair.kept

@@ -60,7 +60,10 @@ FILES = {
     "several energies": (
         b"time,IE_a,IE_b\n0,1,2\n1,2,3\n2,3,4\n", (), ["input: 2 columns", "--energy", "2 'IE_a', 3 'IE_b'"]
     ),
-    "no energy": (b"time,vx,vy\n0,1,2\n1,2,3\n2,3,4\n", (), ["input: no column", "--energy", "2 'vx', 3 'vy'"]),
+    "no energy": (
+        b"time,vx,vy\n0,1,2\n1,2,3\n2,3,4\n", (),
+        ["input: none of the columns is an energy", "--energy", "2 'vx', 3 'vy'"]
+    ),
     "unknown column": (tabulate(math.cos), ("--energy", "heat"), ["input: no column 'heat'", "2 'internal_energy'"]),
     "column misspelt": (
         tabulate(math.cos), ("--energy", "internal_enrg"),

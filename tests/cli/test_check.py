@@ -900,8 +900,8 @@ def test_without_a_history_no_window_has_a_verdict() -> None:
 
 
 def test_the_step_after_a_check_explains_an_error_above_all_warnings() -> None:
-    """The finding of the earlier line is a warning."""
+    """The finding of the earlier line is a warning, so it is listed after the error."""
     place("late.k", LATE.replace(THERE, "*DATABASE_GLSTAT\n      0.01\n" + THERE))
     result = run("check", "late.k")
-    assert result.stdout.index("warning D2R") < result.stdout.index("error D2R101")
+    assert result.stdout.index("error D2R101") < result.stdout.index("warning D2R")
     assert "d2rpick rule D2R101 explains the most severe one" in result.stdout

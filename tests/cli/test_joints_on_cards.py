@@ -109,12 +109,12 @@ def test_a_card_in_a_deck_needs_no_history(tmp_path: Path) -> None:
     assert "these times were not judged" in " ".join(result.stderr.split())
 
 
-def test_a_card_in_a_deck_without_its_parts_exits_with_1(tmp_path: Path) -> None:
+def test_a_card_in_a_deck_without_its_parts_is_refused(tmp_path: Path) -> None:
     main = put(tmp_path / "main.k", f"{PLATES}*END\n")
     times = ("--tr", "0.1", "--td", "0.3")
     result = run("card", *times, "--part", "7", "--deck", str(main))
-    assert result.exit_code == 1
-    assert "card-error" in result.stderr
+    assert result.exit_code == 2
+    assert "part 7: no elements in the deck" in result.stderr
     nothing = run("card", *times, "--deck", str(main))
     assert nothing.exit_code == 2
     assert "--part" in nothing.stderr

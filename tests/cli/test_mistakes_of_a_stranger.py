@@ -342,3 +342,118 @@ def test_a_dry_run_refuses_the_folder_that_the_run_would_refuse(tmp_path: Path) 
     assert "there is no run to resume in this folder" in (
         refuse(*words, str(new), "--resume")
     )
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--verison",), "No such option '--verison'. Did you mean '--version'?"),
+        (
+            ("suggest", "--channel", "kinetic_energy", ENERGY),
+            "--channel kinetic_energy: the name of its column is missing; write kinetic_energy=NAME, such as",
+        ),
+        (("suggest", "-f", "crad", ENERGY), "'card' (did you mean 'card'?)"),
+        (("suggest", "--td", "nan", ENERGY), "'nan' was found, but a time in the unit of the run, such as 0.005,"),
+        (("follow", "--for", "abc", MATSUM), "'abc' is not a number; give a number of seconds, such as 60"),
+        (("follow", "--for", "nan", MATSUM), "'nan' was found, but a number of seconds, such as 60, was expected"),
+        (("explore", "--td-window", "0.2", "0.3", ENERGY), "the record, 0 to 0.15; give times within it"),
+        (("plan", "--part", "", MATSUM), "the id or title of a part is missing; there are: 1 'box', 2 'step'"),
+        (
+            ("suggest", ENERGY, MATSUM),
+            f"do all files belong to the same run? If not, leave out {ENERGY}, which has the energies, or {MATSUM}",
+        ),
+        (
+            ("parts", "--td", "0.3", "--tr", "0.4", "--deck", DECK, MATSUM),
+            "tr must lie before td; give a smaller --tr or a larger --td",
+        ),
+        (("first", DECK, "-o", "new", "--part", "1"), "for example 0.02 for a period of 0.03)"),
+        (
+            ("card", "--part", "1-99", "--tr", "0.1", "--td", "0.2", "--deck", DECK),
+            "parts 4-99: no elements in the deck; give others with --part: the deck has parts 1-3",
+        ),
+        (
+            ("verify", "--switched", str(SAMPLES / "rollover.csv"), ENERGY),
+            f"no column is named like the energy of the reference run {ENERGY}; if both are runs of one model, give",
+        ),
+    ],
+)  # fmt: skip
+def test_a_message_leads_out_of_the_mistake(
+    arguments: tuple[str, ...], message: str
+) -> None:
+    assert message in refuse(*arguments)
+
+
+def test_a_time_after_the_end_of_a_cut_record_asks_for_the_rest(tmp_path: Path) -> None:
+    content = Path(MATSUM).read_bytes()[:40000]
+    file = str(put(tmp_path / "cut.matsum", content))
+    answer = refuse("suggest", "--td", "0.37", "--part", "box", file)
+    assert "where the file is cut; copy the file again, or let the run finish" in answer
+
+
+def test_a_single_column_is_named_by_its_heading(tmp_path: Path) -> None:
+    file = str(put(tmp_path / "one.csv", b"internal_energy\n0.0\n1.0\n2.0\n"))
+    assert "one.csv: only one column, 'internal_energy', was found" in (
+        refuse("suggest", file)
+    )
+
+
+def test_one_output_interval_is_asked_for(tmp_path: Path) -> None:
+    """Before, the warning and the next step named two intervals."""
+    head, *rows = Path(ENERGY).read_text().splitlines()
+    file = str(put(tmp_path / "c.csv", "\n".join([head, *rows[::125], ""]).encode()))
+    answer = run("suggest", file)
+    interval = answer.stderr.partition("write the energies every ")[2].split()[0]
+    assert f"write the states every {interval} or more" in (
+        " ".join(answer.stdout.split())
+    )
+
+
+def test_a_rigid_part_is_to_be_left_out_of_a_card() -> None:
+    """Before, the card for a part with *MAT_RIGID was recommended, after two findings on the output interval."""
+    times = ("--tr", "0.1", "--td", "0.2")
+    answer = run("card", *times, "--part", "3", "--deck", DECK)
+    assert answer.exit_code == 1
+    first = answer.stderr.splitlines()[0]
+    assert first.startswith("warning: card-error")
+    assert "leave it out of the switched parts, or give it a deformable material" in (
+        first
+    )
+    assert "add these cards" not in answer.stderr
+
+
+def write_switching_deck(folder: Path, keyword: str, part: int, tr: float) -> str:
+    """Write a deck with one rigid window of part 1; return its name."""
+    back = "*DEFORMABLE_TO_RIGID_AUTOMATIC"
+    model = (
+        "*CONTROL_TERMINATION\n      0.15\n*PART\nbox\n         1         1         1\n"
+    )
+    to_rigid = (
+        f"{keyword}\n{1:10}{0:10}{tr:10g}\n"
+        f"{0:10}{0:10}{0:10}{0.0001:10}{1:10}{0:10}\n{part:10}\n"
+    )
+    to_deformable = f"{back}\n{2:10}{0:10}{0.06:10g}\n{0:10}{0:10}{0:10}{0:10}{0:10}{1:10}\n{1:10}\n"
+    deck = f"*KEYWORD\n{model}{to_rigid}{to_deformable}*END\n"
+    return str(put(folder / "main.k", deck.encode()))
+
+
+@pytest.mark.parametrize(
+    ("keyword", "part", "cause"),
+    [
+        ("*DEFORMABLE_TO_RIGID_AUTOMATICS", 1, "D2R002"),
+        ("*DEFORMABLE_TO_RIGID_AUTOMATIC", 7, "D2R106"),
+    ],
+)
+def test_a_consequence_of_a_typing_error_names_the_cause(
+    tmp_path: Path, keyword: str, part: int, cause: str
+) -> None:
+    deck = write_switching_deck(tmp_path, keyword, part, 0.01)
+    answer = " ".join(run("check", deck).stdout.split())
+    assert f"error {cause}" in answer
+    assert "first correct the errors of the D2R cards, which may be the cause" in answer
+    assert "D2R104" not in answer
+
+
+def test_a_time_in_milliseconds_is_named_in_a_deck(tmp_path: Path) -> None:
+    deck = write_switching_deck(tmp_path, "*DEFORMABLE_TO_RIGID_AUTOMATIC", 1, 12.5)
+    answer = " ".join(run("check", "--select", "D2R101", deck).stdout.split())
+    assert "was it meant in ms? Then write 0.0125, in the unit of ENDTIM" in answer

@@ -36,8 +36,8 @@ suggest --td 1 | HISTORY
 suggest --td 1 x y | x: no such file
 suggest --td 1 --part 1 --energy 2 x | --energy and --part exclude each other
 suggest --td 0,064 x | --td | '0,064' is not a number
-suggest --td nan x | --td | finite
-suggest --td inf x | --td | finite
+suggest --td nan x | --td | 'nan' was found, but a time
+suggest --td inf x | --td | 'inf' was found, but a time
 suggest --td 1 -f jsno x | 'jsno' | 'json'
 verify --tr 1 --td 2 -f value x | 'value' | 'markdown'
 suggest --td 1 -F d3hsp x | 'd3hsp' | 'hdf5' | 'glstat'
@@ -174,7 +174,7 @@ suggest --td 64 {ENERGY} | was it meant in ms? Then give --td 0.064, in the unit
 suggest --td-window 60 70 {ENERGY} | was it meant in ms? Then give --td-window 0.06 0.07, in the unit of the record
 suggest --td 0.064 --after 86 {ENERGY} | Then give --after 0.086, in the unit of the record
 suggest --td 0.064 --fit-window 10 60 {ENERGY} | Then give --fit-window 0.01 0.06, in the unit of
-suggest --td-window 0.06 0.2 {ENERGY} | --td-window 0.06 0.2 reaches outside the record, 0 to 0.15; give a time within
+suggest --td-window 0.06 0.2 {ENERGY} | --td-window 0.06 0.2 reaches outside the record, 0 to 0.15; give times within
 suggest --td 0.16 {ENERGY} | --td 0.16 lies outside the record, 0 to 0.15; give a time within it$
 suggest --td 0.6 {ENERGY} | --td 0.6 lies outside the record, 0 to 0.15; give a time within it$
 suggest --td 2 {ENERGY} | --td 2 lies outside the record, 0 to 0.15; give a time within it$

@@ -56,6 +56,12 @@ BOX = Printing(node=tuple(range(1, 13)), end=0.15, name="run")
 ONE, LONE = [(0.02, 0.09)], Printing(node=(1,))
 
 
+def join_comments(text: str) -> str:
+    """Return the comments of a card as one line."""
+    lines = (line[1:] for line in text.splitlines() if line[:2] in {"$ ", "# "})
+    return " ".join(" ".join(lines).split())
+
+
 @given(st.integers(-9999, 99999), st.integers(-3, 3))
 def test_few_digits_read_back(digits: int, exponent: int) -> None:
     value = float(f"{digits}e{exponent}")
@@ -244,6 +250,24 @@ def test_warnings_are_those_that_apply() -> None:
     assert "already" in text(PARTS._replace(merge=5))
     assert "    7.0e-5 " in text(PARTS)  # 1/1000 of the window
     assert "    1.0e-5 " in text(PARTS._replace(step_cap=1e-5))
+
+
+def test_the_comments_ask_only_for_flags_that_the_constraints_allow() -> None:
+    comments = join_comments(print_cards(ONE, MERGED).text)
+    assert (
+        "If none also joins an unswitched part, set NRBF, NCSF 1 (delete)" in comments
+    )
+    assert "End the window before a wall (RWF 0)." in comments
+
+
+def test_the_comments_allow_to_plan_later_flights_from_a_switched_run() -> None:
+    for printing in (MERGED, BOX._replace(solver="radioss")):
+        comments = join_comments(print_cards(ONE, printing).text)
+        assert (
+            "Do not choose new times for a window from a run that is rigid in it."
+            in comments
+        )
+        assert "no energy output shows this loss" in comments
 
 
 def test_every_window_has_sets_of_its_own(tmp_path: Path) -> None:

@@ -416,18 +416,6 @@ def test_the_energy_alone_is_said_to_be_uncertain_and_strict_refuses_it() -> Non
     )
 
 
-def test_suggest_and_plan_name_the_same_ends_of_a_flight_from_the_energy() -> None:
-    """The ends depend on td, so the row of a plan contains those that belong to its td."""
-    question = ("--energy", "boxIE_J", ROLLOVER)
-    flight = run_json("suggest", *question)["flight"]
-    (window,) = run_json("plan", *question)["windows"]
-    assert flight["source"] == "energy"
-    assert (window["flight_start"], window["flight_end"]) == (
-        flight["start"],
-        flight["end"],
-    )
-
-
 def test_windows_of_acceptable_tr_hold_the_recommended_one_and_verify_throughout() -> (
     None
 ):

@@ -52,9 +52,9 @@ def test_parts_come_in_the_order_of_the_file_and_once(
             "'door' is the title of several parts, choose by number: 19 'door', 20 'door'",
         ),
         (["12"], "'12' is the title of part 4, as a number it means 12 'Roof'"),
-        (["3,"], "no part ''"),
+        (["3,"], "the id or title of a part is missing"),
         (["-3"], "no part '-3'"),
-        ([""], "no part ''"),
+        ([""], "the id or title of a part is missing"),
     ],
 )
 def test_what_names_no_part_or_several_is_refused(

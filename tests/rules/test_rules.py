@@ -173,7 +173,6 @@ def test_one_wrong_id_does_not_hide_another(tmp_path: Path) -> None:
         "D2R106": 1,
         "D2R101": 1,
         "D2R004": 1,
-        "D2R104": 1,
     }
 
 

@@ -310,7 +310,7 @@ def _suggest_window(
 ) -> PlannedFlight:
     """Complete a row of the plan with the window suggested for a flight that starts after the previous landing.
 
-    If only the energy shows the flight, its ends depend on td, and an oscillator is found for some td but not for
+    If only the energy shows the flight, its start depends on td, and an oscillator is found for some td but not for
     others. Therefore the row contains the flight that belongs to the chosen td.
     """
     is_after_here = (
@@ -333,10 +333,6 @@ def _suggest_window(
             start=known_flight.start, source=known_flight.source
         )
         row = row._replace(flight=flight, start=known_flight.start)
-        if known_flight.source == "energy" and known_flight.end is not None:
-            flight = flight._replace(end=known_flight.end)
-            margin = find_margin(reference.history, flight, flight_settings)
-            row = row._replace(flight=flight, end=known_flight.end, margin=margin)
     if answer.recommended is None:
         return row._replace(reason=answer.why_none)
     if answer.recommended.rigid_time < shortest:

@@ -197,9 +197,7 @@ def find_internal_energy(
     else:
         count = "the table has no line of headings, so no column is"
     choices = energies or [
-        column
-        for column in candidates
-        if may_be_energy(layout.name(column), layout.unit(column))
+        column for column in candidates if may_be_energy(layout.name(column))
     ]
     menu = _list_columns(layout, choices or candidates)
     if not choices:

@@ -175,6 +175,9 @@ def _report_no_table(text: Text, lines: Sequence[str]) -> FormatError:
         problem = (
             f"{text.name}:{number}: only one column, {quote_start(line)}, was found"
         )
+        heading = next((line for earlier, line in numbered if earlier < number), "")
+        if heading:
+            problem = f"{text.name}: only one column, {quote_start(heading)}, was found"
         cure = "add a column with the times"
     elif len(numbered) == 1 and _SEPARATED_WORDS.match(line.strip()):
         cure = "write rows of numbers below the headings, or give another file"

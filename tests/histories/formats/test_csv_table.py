@@ -359,7 +359,7 @@ def test_curves_side_by_side_have_times_of_their_own() -> None:
         (
             "time,a,b\ns,mm,mm\n0,1,2\n1,2,3\n",
             [],
-            "none of the columns is an energy by its name or unit: 2 'a', 3 'b'",
+            "none of the columns is an energy by its name or unit: 2 'a mm', 3 'b mm'",
         ),
         (
             "time,a,u_x_m\n0,1,2\n1,2,3\n",
