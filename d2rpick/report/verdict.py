@@ -140,8 +140,7 @@ def list_next_step(
             f"look at both runs with {line} and the same command for the switched run"
         )
     elif answer.is_of_other_times:
-        words = _leave_out_times(question.times)
-        line = write_command(question, "verify", *words)
+        line = write_command(question, "verify", *_leave_out_times(question.times))
         step = f"compare the window of the switched run with {line}"
     elif decision.verdict == DO_NOT_USE:
         if answer.switched and not answer.switched.objections:
