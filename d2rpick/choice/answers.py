@@ -25,6 +25,7 @@ from d2rpick.choice.pair.candidates import Candidate, Candidates, Pair, judge_ti
 from d2rpick.choice.pair.decision import (
     CHECK_SWITCHED_RUN,
     CHOOSE_ANOTHER,
+    COMPARE_OTHER_WINDOW,
     GIVE_END_OF_LOAD,
     GIVE_SWITCHED_RUN_OF_MODEL,
     Decision,
@@ -120,6 +121,8 @@ class PairVerdict(AnswerAtTd):
         """Advice on a pair that is not admissible."""
         if self.is_of_other_run:
             return GIVE_SWITCHED_RUN_OF_MODEL
+        if self.is_of_other_times:
+            return COMPARE_OTHER_WINDOW
         if self._is_refuted:
             return CHECK_SWITCHED_RUN
         flight = self.situation.flight
@@ -166,7 +169,7 @@ class PairVerdict(AnswerAtTd):
     @cached_property
     def better(self) -> Pair | None:
         """A better pair with a grade other than "poor": that of ``suggest`` for this td, or what it names as better."""
-        if self._is_refuted or self.is_of_other_run:
+        if self._is_refuted or self.is_of_other_run or self.is_of_other_times:
             return None
         good = self._good_pair
         if good is None or good.td != self.situation.td:
@@ -205,6 +208,11 @@ class PairVerdict(AnswerAtTd):
     def is_of_other_run(self) -> bool:
         """True if the switched run differs from the reference run although neither was rigid yet."""
         return self.switched is not None and self.switched.is_of_other_run
+
+    @property
+    def is_of_other_times(self) -> bool:
+        """True if the switched run was rigid in another window, so that it shows nothing about this pair."""
+        return self.switched is not None and self.switched.is_of_other_times
 
     @property
     def _is_refuted(self) -> bool:

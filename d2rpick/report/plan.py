@@ -42,7 +42,7 @@ from d2rpick.report.situation import describe_input
 from d2rpick.report.suggestion import describe_given_up_time
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterable, Sequence
 
     from d2rpick.choice.pair.decision import Decision
     from d2rpick.choice.pair.situation import Situation
@@ -281,14 +281,18 @@ def give_plan_sentence(plan: RunPlan) -> str:
         return f"{DO_NOT_USE} any window of this run: no flight is found in the record"
     if not supported:
         return f"{DO_NOT_USE} any window of this run now"
-    spans = " and ".join(
-        "from {:.6g} to {:.6g}".format(*window) for window in plan.windows
-    )
+    poor = [row for row in supported if _is_poor(row)]
+    spans = _join_spans(row for row in supported if row not in poor)
+    poor_spans = _join_spans(poor)
     use = _describe_use(plan)
     share = format_rigid_share(plan.rigid_fraction, plan.history)
-    if _uses_only_poor_windows(plan):
-        return f"{use}: rigid {spans}, {share}, is planned only because of `min_quality` poor"
-    text = f"{use}: make the parts rigid {spans}, {share}"
+    if not spans:
+        return f"{use}: rigid {poor_spans}, {share}, is planned only because of `min_quality` poor"
+    text = f"{use}: make the parts rigid {spans}"
+    if poor:
+        text += f"; {poor_spans} they are rigid only because of `min_quality` poor; together {share}"
+    else:
+        text += f", {share}"
     if plan.run_time_share is not None:
         text += f"; saves {format_saved_share(plan.run_time_share)}"
     if not waiting:
@@ -297,6 +301,17 @@ def give_plan_sentence(plan: RunPlan) -> str:
         "1 more window requires" if waiting == 1 else f"{waiting} more windows require"
     )
     return f"{text}; {more} a new run"
+
+
+def _join_spans(rows: Iterable[PlannedFlight]) -> str:
+    """Return the rigid windows of flights in words; empty without flights."""
+    windows = [row.window for row in rows if row.window]
+    return " and ".join("from {:.6g} to {:.6g}".format(*window) for window in windows)
+
+
+def _is_poor(row: PlannedFlight) -> bool:
+    """Return True if the window of a flight should not be used."""
+    return row.decision is not None and row.decision.verdict == DO_NOT_USE
 
 
 def _describe_use(plan: RunPlan) -> str:
@@ -324,28 +339,22 @@ def _describe_use(plan: RunPlan) -> str:
 
 def _uses_only_poor_windows(plan: RunPlan) -> bool:
     """Return True if every window of the plan is one that should not be used, as `min_quality` allows."""
-    decisions = [row.decision for row in plan.supported if row.decision]
-    return bool(decisions) and all(
-        decision.verdict == DO_NOT_USE for decision in decisions
-    )
+    decided = [row for row in plan.supported if row.decision]
+    return bool(decided) and all(map(_is_poor, decided))
 
 
 def _list_decided_flights(plan: RunPlan) -> list[PlannedFlight]:
     """Return the flights on which the first sentence of a plan rests.
 
-    These are the flights with a usable window or, if there is none, those with a window or, failing that, the longest
-    flight that has a pair.
+    These are the flights with a planned window or, if there is none, the longest flight that has a pair.
     """
     judged = [row for row in plan.flights if row.decision and not row.done]
     planned = [row for row in judged if row.status == "supported"]
-    usable = [
-        row for row in planned if row.decision and row.decision.verdict != DO_NOT_USE
-    ]
     refused = [
         row for row in judged if row.reason and not row.reason.startswith(TOO_SHORT)
     ]
     longest = max(refused, key=lambda row: row.end - row.start, default=None)
-    return usable or planned or ([longest] if longest else [])
+    return planned or ([longest] if longest else [])
 
 
 def list_decisive_reasons(plan: RunPlan) -> list[tuple[str, str]]:

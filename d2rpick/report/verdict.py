@@ -28,6 +28,8 @@ from d2rpick.report.next_step import (
 from d2rpick.report.situation import list_situation_heading
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from d2rpick.base.spans import Times
     from d2rpick.choice.answers import PairVerdict
     from d2rpick.choice.pair.decision import Decision
@@ -137,6 +139,9 @@ def list_next_step(
         step = (
             f"look at both runs with {line} and the same command for the switched run"
         )
+    elif answer.is_of_other_times:
+        line = write_command(question, "verify", *_leave_out_times(question.times))
+        step = f"compare the window of the switched run with {line}"
     elif decision.verdict == DO_NOT_USE:
         if answer.switched and not answer.switched.objections:
             return add_step_to_copy(
@@ -173,14 +178,18 @@ def _find_next_window(answer: PairVerdict) -> Times | None:
 
 def _write_command_for_window(question: RepeatedQuestion, window: Times) -> str:
     """Return the command that compares the switched run in another of its windows."""
-    words = question.times
-    kept = [
+    tr, td = (f"{time:.6g}" for time in window)
+    kept = _leave_out_times(question.times)
+    return write_command(question, "verify", "--tr", tr, "--td", td, *kept)
+
+
+def _leave_out_times(words: Sequence[str]) -> list[str]:
+    """Return the words of a command without the given tr and td."""
+    return [
         word
         for before, word in pairwise(("", *words))
         if not {before, word} & {"--tr", "--td"}
     ]
-    tr, td = (f"{time:.6g}" for time in window)
-    return write_command(question, "verify", "--tr", tr, "--td", td, *kept)
 
 
 def _name_usable_results(answer: PairVerdict) -> str:

@@ -34,6 +34,7 @@ from tests.command import (
     BOX,
     ENERGY,
     ROLLOVER,
+    ROOT,
     join_wrapped_lines,
     make_replay_file as motion,
     put,
@@ -654,6 +655,24 @@ def test_a_right_switched_run_of_a_crushed_body_was_rigid_from_tr_to_td(
         assert any(
             "is constant from" in objection for objection in comparison.objections
         )
+        assert comparison.is_of_other_times
+
+
+def test_a_run_that_was_switched_at_other_times_leads_to_the_window_of_that_run() -> (
+    None
+):
+    """Before, the next command was explore, which called the same pair "use"."""
+    switched = ROOT / "sample_data" / "oscillator_switched"
+    compared = ("--switched", str(switched), ENERGY)
+    asked = run("verify", "--tr", "0.0135867", "--td", "0.0687534", *compared)
+    text = join_wrapped_lines(asked.stdout)
+    cure = "to improve leave out --tr and --td to compare the window in which the switched run was rigid"
+    assert cure in text
+    assert (
+        f"compare the window of the switched run with d2rpick verify --switched {switched} {ENERGY}"
+        in text
+    )
+    assert run("verify", *compared).stdout.startswith("comparison  passed")
 
 
 def test_where_the_reference_stands_still_too_a_longer_stillness_is_no_objection() -> (

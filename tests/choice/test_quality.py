@@ -593,3 +593,16 @@ def test_noise_is_not_blamed_on_the_output_interval(noise: float) -> None:
         assert "write the energies more often" not in cause.cure
     else:
         assert cause.reason.startswith("the energy has 5")
+
+
+def test_an_inaccurate_tr_is_explained_without_a_second_but(tmp_path: Path) -> None:
+    """Before, "but" followed "but", and "this error" had no noun, if the error hardly affects the next contact."""
+    coarse = zip(TIME[::10], ENERGY[::10], strict=True)
+    lines = ["time,internal_energy", *(f"{t:.3f},{e:.1e}" for t, e in coarse)]
+    path = tmp_path / "coarse.csv"
+    path.write_text("\n".join(lines), "utf-8")
+    verdict = verify(read(str(path)), tr=0.0135867, td=0.0687534)
+    reason = require(verdict.decision).reason
+    assert "which is more than its timing tolerance of ±5e-05" in reason
+    assert "so the vibration error may be larger" in reason
+    assert "but" not in reason

@@ -283,6 +283,8 @@ def test_a_run_that_was_cut_is_called_so(tmp_path: Path) -> None:
     assert "cut-runs" not in {
         caution.code for caution in compare_rows(variants.TD, rows[:3]).cautions
     }
+    long = replace(rows[3], record_end=0.3)
+    assert find_cut_runs([rows[0], long]) == []
 
 
 @given(st.lists(st.tuples(st.floats(0, 1), st.floats(0, 0.3)), min_size=1, max_size=6))

@@ -124,7 +124,7 @@ def test_a_poor_window_is_called_poor() -> None:
         assert alone["quality"] == row["quality"]
     text = plan.text("table", DisplayOptions())
     wrong = f"the vibration after td is wrong by {rows[1]['residual']:.0%}"
-    assert f"flight {rows[1]['flight']}   do not use: {wrong}" in text
+    assert f"why   flight {rows[1]['flight']}: {wrong}" in text
     assert rows[1]["residual"] > 0.5
     sentence = " ".join(text.partition("\nnext")[0].split())
     assert f"(do not use flight {rows[1]['flight']})" in sentence
@@ -141,6 +141,12 @@ def test_the_first_sentence_recommends_no_poor_window(history: list[str]) -> Non
     assert sentence.startswith(
         f"use 1 of {len(rows)} windows now (do not use flight {number}): make the parts rigid from"
     )
+    good, poor = ("from {tr:.6g} to {td:.6g}".format(**row) for row in planned)
+    first, named, rest = join_wrapped_lines(sentence).partition(good)
+    assert poor not in first
+    assert named
+    assert f"; {poor} they are rigid only because of --min-quality poor" in rest
+    assert f"why   flight {number}: " in sentence
 
 
 def test_where_all_planned_windows_are_poor_none_is_recommended(

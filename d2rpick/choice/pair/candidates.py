@@ -511,7 +511,8 @@ def _list_remarks(
     if measured and measured["residual_high"] > measured["residual"] + MUCH_HIGHER:
         yield f"residual up to {measured['residual_high']:.2g} if the record hides a further mode"
     if measured and reach > measured["timing_tolerance"]:
-        yield f"tr is known only to ±{reach:.2g}, but its timing tolerance is ±{measured['timing_tolerance']:.2g}"
+        tolerance = measured["timing_tolerance"]
+        yield f"tr is known only to ±{reach:.2g}, which is more than its timing tolerance of ±{tolerance:.2g}"
     if not (measured or situation.at_rest) and reach >= situation.history.step:
         yield "the level is within the sampling error of an extremum"
 

@@ -43,6 +43,10 @@ CHECK_SWITCHED_RUN: Final = (
     "check that the switched run was switched at these times and is otherwise identical to the reference run; "
     "if so, choose another td"
 )
+# COMPARE_OTHER_WINDOW: advice if the switched run was rigid in another window than the one that is judged.
+COMPARE_OTHER_WINDOW: Final = (
+    "leave out `tr` and `td` to compare the window in which the switched run was rigid"
+)
 # GIVE_SWITCHED_RUN_OF_MODEL: advice if the switched run differs from the reference run before the switch.
 GIVE_SWITCHED_RUN_OF_MODEL: Final = (
     "give the switched run of this model, with the same loads and velocities"

@@ -761,7 +761,8 @@ def _list_causes_for_fair(situation: Situation, best: Candidate) -> list[Cause]:
         reach = (best.tr_high or best.tr) - best.tr
         causes.append(
             Cause(
-                f"tr is known only to ±{reach:.1g}, but its timing tolerance is ±{best.timing_tolerance:.1g}",
+                f"tr is known only to ±{reach:.1g}, which is more than its timing tolerance of "
+                f"±{best.timing_tolerance:.1g}, so the vibration error may be larger",
                 "write the energies more often, and with more digits",
                 kind="tr is less accurate than its timing tolerance demands",
             )

@@ -391,9 +391,9 @@ def _find_common_interval(rows: Sequence[StudyRow]) -> tuple[list[float], float,
 def find_cut_runs(rows: Sequence[StudyRow]) -> list[StudyRow]:
     """Return the runs that were cut off: their files end within a state, or their records are unusually short."""
     read_to = [(row, row.record_end) for row in rows if row.record_end is not None]
-    # A run that could not be judged, such as one of another load case, does not show how long the others should be.
-    ends = [end for row, end in read_to if row.judged]
-    whole = median_high(ends) if ends else 0.0
+    # A run that could not be judged does not show how long the runs of the study should be.
+    judged = [end for row, end in read_to if row.judged]
+    whole = median_high(judged) if judged else 0.0
     return [
         row
         for row, end in read_to

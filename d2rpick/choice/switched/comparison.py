@@ -54,10 +54,11 @@ _UNKNOWN_WINDOWS: Final = SwitchedWindows(None)
 class Comparison(NamedTuple):
     """Differences between a switched run and its reference run; unknown quantities are None.
 
-    The fields are the keys of the JSON output, except the last four: ``min_mean`` is the smallest expected ratio of
+    The fields are the keys of the JSON output, except the last five: ``min_mean`` is the smallest expected ratio of
     the means [-], ``has_energy`` is False if the energies after td are not compared, because they are only round-off or
-    all wrong, ``misreported`` contains the names of the parts for which the solver reports a wrong energy after td, and
-    ``is_of_other_run`` is True if the runs differ although neither was rigid yet.
+    all wrong, ``misreported`` contains the names of the parts for which the solver reports a wrong energy after td,
+    ``is_of_other_run`` is True if the runs differ although neither was rigid yet, and ``is_of_other_times`` is True if
+    the switched run was rigid in another window.
 
     ``energy_frozen`` is the energy of the switched run at td, ``energy_td`` that of the reference run. ``rigid_from``
     and ``rigid_to`` are the first and last states of the window around the middle of (tr, td) in which the energy of
@@ -90,6 +91,7 @@ class Comparison(NamedTuple):
     has_energy: bool = True
     misreported: tuple[str, ...] = ()
     is_of_other_run: bool = False
+    is_of_other_times: bool = False
 
 
 def compare_with_reference(
@@ -207,9 +209,13 @@ def compare_runs(
     first_rigid = min(rigid[0] if rigid else tr, tr)
     first_of_all = min(first_rigid, windows.first_rigid)
     of_other_run = [*check_same_model(reference, switched, first_of_all, explain)]
+    rigid_at_other_times = [
+        *_check_for_other_window(reference, switched, rigid, tr, td, limit)
+    ]
     objections = [
         *of_other_run,
-        *_check_rigid_window(reference, switched, rigid, tr, td, limit),
+        *_check_rigid_window(switched, rigid, tr, td),
+        *rigid_at_other_times,
     ]
     differing = [
         *_check_before_window(reference, switched, momenta, windows, first_rigid)
@@ -243,6 +249,7 @@ def compare_runs(
         min_mean=min_mean,
         has_energy=is_reported and mean_reference > rounding,
         is_of_other_run=bool(of_other_run),
+        is_of_other_times=bool(rigid_at_other_times),
     )
 
 
@@ -392,6 +399,16 @@ def _find_rigid_window(
 
 
 def _check_rigid_window(
+    switched: History, rigid: Times | None, tr: float, td: float
+) -> Iterator[str]:
+    """Yield an objection if no state shows that the energy is constant somewhere between tr and td."""
+    if rigid is None:
+        yield f"the switched run has no state between tr {tr:g} and td {td:g}: it may not have been rigid"
+    elif rigid[1] - rigid[0] <= 2 * switched.step < td - tr:
+        yield f"the energy of the switched run is not constant from tr {tr:g} to td {td:g}: was it switched?"
+
+
+def _check_for_other_window(
     reference: History,
     switched: History,
     rigid: Times | None,
@@ -399,17 +416,13 @@ def _check_rigid_window(
     td: float,
     limit: float,
 ) -> Iterator[str]:
-    """Yield an objection if the states show that the energy is not constant from tr to td.
+    """Yield an objection if the energy is constant in another window than from tr to td.
 
     A constant energy before tr or after td is an objection only if the energy of the reference run is not constant
     there.
     """
-    if rigid is None:
-        yield f"the switched run has no state between tr {tr:g} and td {td:g}: it may not have been rigid"
-        return
     room = 2 * switched.step
-    if rigid[1] - rigid[0] <= room < td - tr:
-        yield f"the energy of the switched run is not constant from tr {tr:g} to td {td:g}: was it switched?"
+    if rigid is None or rigid[1] - rigid[0] <= room < td - tr:
         return
 
     def lasts_longer(start: float, end: float) -> bool:
@@ -424,7 +437,7 @@ def _check_rigid_window(
         or lasts_longer(td, rigid[1])
     ):
         rigid_text = f"the energy of the switched run is constant from {rigid[0]:.6g} to {rigid[1]:.6g}"
-        yield f"{rigid_text}, not from tr {tr:g} to td {td:g}; leave out `tr` and `td` to compare that window"
+        yield f"{rigid_text}, not from tr {tr:g} to td {td:g}"
 
 
 def _check_locked_in_energy(
