@@ -230,7 +230,7 @@ def test_what_a_real_solver_does_at_the_switches_is_told(solver: str) -> None:
         "first time step at or after",
         "co-rotational",
         "vibration is lost",
-        "a switched run",
+        "from a run that is rigid in it",
     ):
         assert phrase in comment_text
 
