@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.errors import COPY_AGAIN, list_names
@@ -69,8 +70,20 @@ def name_deck_of_run(
 ) -> NamedDeck:
     """Return the main deck next to the history or, if there is none or decks are excluded, a placeholder."""
     is_excluded = "--no-deck" in question.options
-    deck = None if is_excluded else find_deck_beside(question.files)
+    deck = None if is_excluded else _find_deck(question.files)
     return NamedDeck(deck, "") if deck else NamedDeck(_SOME_DECK, f" ({hint})")
+
+
+def _find_deck(files: Sequence[str]) -> str | None:
+    """Return the only main deck in a run folder, or the deck next to a history that has its name; None if unknown."""
+    if len(files) == 1 and os.path.isdir(files[0]):  # noqa: PTH112  pathlib would slow down start-up
+        from d2rpick.deck import (
+            find_decks_of_run,
+        )  # Imported here to keep start-up fast.
+
+        decks = find_decks_of_run(files[0])
+        return decks[0] if len(decks) == 1 else None
+    return find_deck_beside(files)
 
 
 def write_command(

@@ -2,10 +2,13 @@
 
 import re
 import shlex
+import shutil
 from pathlib import Path
 
 import pytest
 
+from d2rpick.report.formats import RepeatedQuestion
+from d2rpick.report.next_step import name_deck_of_run
 from tests.command import (
     BOX,
     ENERGY,
@@ -322,3 +325,15 @@ def test_the_comparison_of_a_fall_without_vibration_gets_the_times_of_its_window
     checked = run("check", "-q", str(cards), "--history", history).stdout
     again = find_command(join_wrapped_lines(checked), "verify")
     assert again[:5] == words[:5]
+
+
+def test_the_deck_in_the_folder_of_a_run_is_named_in_the_next_command(
+    tmp_path: Path,
+) -> None:
+    """The deck has another name than the history, and was read; before, the command asked for it."""
+    folder = tmp_path / "run"
+    folder.mkdir()
+    shutil.copy(MATSUM, folder / "matsum")
+    shutil.copy(ROOT / "sample_data" / "rollover_box.k", folder / "main.k")
+    deck = name_deck_of_run(RepeatedQuestion(files=(str(folder),)))
+    assert (deck.name, deck.hint) == (str(folder / "main.k"), "")
