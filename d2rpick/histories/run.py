@@ -45,7 +45,7 @@ from d2rpick.histories.table_parts import (
     read_energies_of_parts_not_chosen,
 )
 from d2rpick.histories.wrong_values import (
-    Column,
+    CheckedQuantity,
     check_balance,
     check_internal_energy,
     check_momenta,
@@ -160,7 +160,7 @@ class OpenedRun:
             total = balance.kinetic_and_internal if balance else None
             if balance is None or not np.array_equal(balance.time, history.time):
                 total = None
-            internal = Column(history.channel, history.time, history.energy)
+            internal = CheckedQuantity(history.channel, history.time, history.energy)
             check_internal_energy(internal, total, self.files)
             return
         total = give_if_written(self._compute_total_of_parts)
@@ -168,7 +168,7 @@ class OpenedRun:
         for part, energy in zip(
             deforming, self.part_energies(deforming).T, strict=True
         ):
-            internal = Column(
+            internal = CheckedQuantity(
                 f"internal energy of part {part.name}", self.part_time, energy
             )
             check_internal_energy(internal, total, self.files)

@@ -37,7 +37,7 @@ _HEAD: Final = 4096
 _NUMBER: Final = re.compile(rb"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][-+]?\d+)?")
 
 
-class Column(NamedTuple):
+class CheckedQuantity(NamedTuple):
     """A quantity over time, with its name for messages: ``time`` and ``values`` have the shape (n,)."""
 
     name: str
@@ -64,7 +64,7 @@ def has_lone_jump(energy: Samples) -> bool:
 
 
 def check_internal_energy(
-    internal: Column, total: Samples | None, files: Sequence[Source]
+    internal: CheckedQuantity, total: Samples | None, files: Sequence[Source]
 ) -> None:
     """Raise HistoryError if one internal energy exceeds the total energy of all other states, or is far below zero.
 
@@ -89,7 +89,7 @@ def check_balance(balance: Balance, files: Sequence[Source]) -> None:
     total = balance.kinetic_and_internal
     if balance.kinetic is None or total is None or total.size < _FEWEST:
         return
-    kinetic = Column("kinetic energy", balance.time, balance.kinetic)
+    kinetic = CheckedQuantity("kinetic energy", balance.time, balance.kinetic)
     _check_sign(kinetic, files)
     _check_supply(kinetic, total, files)
 
@@ -111,12 +111,12 @@ def check_momenta(momenta: Momenta, files: Sequence[Source]) -> None:
     name = f"the {'xyz'[axis]} {'velocity' if momenta.velocity else 'momentum'}"
     if momenta.parts:
         name = f"{name} of part {momenta.parts[member].name}"
-    column = Column(name, momenta.time, values[:, member, axis])
+    column = CheckedQuantity(name, momenta.time, values[:, member, axis])
     expected = f"at most {others:.6g} (the largest value of the other states)"
     raise _refuse(column, state + 1, expected, files)
 
 
-def _check_sign(column: Column, files: Sequence[Source]) -> None:
+def _check_sign(column: CheckedQuantity, files: Sequence[Source]) -> None:
     """Raise HistoryError if one energy is far below zero, as no other is."""
     energy = column.values
     state = int(energy.argmin())
@@ -128,7 +128,9 @@ def _check_sign(column: Column, files: Sequence[Source]) -> None:
         raise _refuse(column, state, "at least 0", files)
 
 
-def _check_supply(column: Column, total: Samples, files: Sequence[Source]) -> None:
+def _check_supply(
+    column: CheckedQuantity, total: Samples, files: Sequence[Source]
+) -> None:
     """Raise HistoryError if one energy exceeds the ``total`` (n,) of all other states, and no motion supplies it.
 
     At an end of the record, only one state lies beside it, so that a load may have begun or ended there.
@@ -165,7 +167,7 @@ def _find_largest_jump(values: Samples) -> tuple[int, float]:
 
 
 def _refuse(
-    column: Column, state: int, expected: str, files: Sequence[Source]
+    column: CheckedQuantity, state: int, expected: str, files: Sequence[Source]
 ) -> HistoryError:
     """Return the error that names the place of a value, the value, and what was expected."""
     value, time = float(column.values[state]), float(column.time[state])
