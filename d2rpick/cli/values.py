@@ -35,8 +35,11 @@ if TYPE_CHECKING:
     from d2rpick.api.runs import Run
 
     FloatType = click.ParamType[float]
+    WordType = click.Choice[str]
 else:
-    FloatType = click.ParamType  # This class has been generic since click 8.4.
+    # These classes are not generic in older versions of click.
+    FloatType = click.ParamType
+    WordType = click.Choice
 
 CARDS: Final = tuple(list_options(Cards))
 # Placeholder of a time that is measured by the clock, not in the unit of the run.
@@ -109,7 +112,7 @@ class NumberType(FloatType):
         return number
 
 
-class Word(click.Choice[str]):
+class Word(WordType):
     """One of several words; the error message names the word that resembles a wrong one."""
 
     def get_invalid_choice_message(self, value: Any, ctx: click.Context | None) -> str:
