@@ -239,7 +239,7 @@ def _format_usage_error(error: click.UsageError) -> str:
 
 
 def _suggest_alike(wanted: str, options: Iterable[str]) -> str:
-    """Return the options that resemble a typed one most, joined by "or"; empty if there are no options."""
+    """Return the options whose spelling is closest to a mistyped option, joined by "or"; empty without options."""
     import difflib
 
     likeness = {

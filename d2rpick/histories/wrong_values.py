@@ -81,7 +81,7 @@ def check_internal_energy(
     others = np.delete(energy, state)
     if jump > _BEYOND_ALL * np.ptp(others) > 0:
         expected = f"at most {others.max():.6g} (the largest value of the other states)"
-        raise _refuse(internal, state, expected, files)
+        raise _make_error(internal, state, expected, files)
 
 
 def check_balance(balance: Balance, files: Sequence[Source]) -> None:
@@ -113,7 +113,7 @@ def check_momenta(momenta: Momenta, files: Sequence[Source]) -> None:
         name = f"{name} of part {momenta.parts[member].name}"
     column = CheckedQuantity(name, momenta.time, values[:, member, axis])
     expected = f"at most {others:.6g} (the largest value of the other states)"
-    raise _refuse(column, state + 1, expected, files)
+    raise _make_error(column, state + 1, expected, files)
 
 
 def _check_sign(column: CheckedQuantity, files: Sequence[Source]) -> None:
@@ -125,7 +125,7 @@ def _check_sign(column: CheckedQuantity, files: Sequence[Source]) -> None:
     if depth > max(
         _NEGATIVE * np.abs(others).max(), -_MORE_NEGATIVE * others.min(), 0.0
     ):
-        raise _refuse(column, state, "at least 0", files)
+        raise _make_error(column, state, "at least 0", files)
 
 
 def _check_supply(
@@ -150,7 +150,7 @@ def _check_supply(
             expected = (
                 f"at most {largest:.6g} (the largest total energy of the other states)"
             )
-            raise _refuse(column, state, expected, files)
+            raise _make_error(column, state, expected, files)
 
 
 def _find_largest_jump(values: Samples) -> tuple[int, float]:
@@ -166,10 +166,10 @@ def _find_largest_jump(values: Samples) -> tuple[int, float]:
     return state + 1, float(jumps[state])
 
 
-def _refuse(
+def _make_error(
     column: CheckedQuantity, state: int, expected: str, files: Sequence[Source]
 ) -> HistoryError:
-    """Return the error that names the place of a value, the value, and what was expected."""
+    """Return an error with the place and the value of a quantity, and the value that was expected."""
     value, time = float(column.values[state]), float(column.time[state])
     place, unit = _locate(value, time, files)
     if not place:

@@ -79,7 +79,7 @@ def as_table(overview: Overview, display: DisplayOptions) -> str:
 
 
 def list_overview_lines(overview: Overview) -> list[tuple[str, str]]:
-    """Return whether the run can be used, why, its flights, and the next command, as (name, sentence) pairs."""
+    """Return the verdict on the run, its reason, the flights and the next command, as (name, sentence) pairs."""
     record = _NOT_JUDGED if overview.energies else _RECORD[overview.verdict]
     lines = [("record", record), ("why", overview.reason)]
     lines += [("flight", format_flight(*flight)) for flight in overview.flights]

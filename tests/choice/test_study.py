@@ -54,7 +54,7 @@ def make_study_row(
     """Return a run with these windows of acceptable tr; its error falls linearly from 0 at 0 to 1 at td = 10."""
     acceptable = np.array(windows, float).reshape(-1, 2)
     study_row = StudyRow(
-        source, OK, tr=tr, tr_low=tr - width, tr_high=tr + width, energy_td=1.0, residual=0.1, basis="oscillator",
+        source, OK, tr=tr, tr_low=tr - width, tr_high=tr + width, energy_td=1.0, residual=tr / 10, basis="oscillator",
         td=10.0, acceptable=acceptable, alike=acceptable, profile=np.array([[0.0, 10.0], [0.0, 1.0]]),
     )  # fmt: skip
     return replace(study_row, **other_fields)  # type: ignore[arg-type]
@@ -692,3 +692,10 @@ def test_a_large_error_has_its_reason_in_a_study_even_if_it_is_small_beside_the_
         ("why", "use in 1 run: wrong by 60%, but")
     ]
     assert not list_run_reasons(compare_rows(10.0, [row]))
+
+
+def test_a_run_has_the_residual_that_suggest_gives_at_its_own_tr() -> None:
+    """The interpolated error of a run at its own tr differed from its residual in the last digit."""
+    row = replace(make_study_row("a", (0.0, 5.0), tr=2.0), residual=0.199)
+    common = compare_rows(10.0, [row]).common
+    assert (common.tr, common.errors) == (row.tr, (row.residual,))

@@ -619,11 +619,18 @@ def choose_common_tr(rows: Sequence[StudyRow]) -> Common:
     if tr is None:
         tr = find_fewest_digits(low, min(high, low + _ROUNDED * (td - low)))
     (window,) = shared[(shared[:, 0] <= tr) & (tr <= shared[:, 1])].tolist()
-    errors = tuple(
-        None if row.profile is None else interpolate_error(row.profile, tr)
-        for row in rows
-    )
+    errors = tuple(_find_error(row, tr) for row in rows)
     return Common(tr, tuple(window), None, bool(keeping.size), errors)
+
+
+def _find_error(row: StudyRow, tr: float) -> float | None:
+    """Return the error of a run at tr [-]; None if the run was not judged.
+
+    At the run's own tr, it is the residual that ``suggest`` gives. Elsewhere it is interpolated.
+    """
+    if tr == row.tr and row.residual is not None:
+        return row.residual
+    return None if row.profile is None else interpolate_error(row.profile, tr)
 
 
 def _find_agreed_tr(judged: Sequence[StudyRow], keeping: Samples) -> float | None:
