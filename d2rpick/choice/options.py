@@ -1,4 +1,4 @@
-"""Declare the options of a choice, each with its type, default, help, range and commands.
+"""Declare the choice options, each with its type, default, help, range and commands.
 
 The options of the command line, the keyword arguments of Python and the settings of a choice all follow from the fields
 of `ChoiceOptions`.  This module imports no numerics, since each command needs the table when it starts.
@@ -195,5 +195,5 @@ class ChoiceOptions:
 
 @cache
 def list_uses() -> dict[str, Use]:
-    """Return how each option of a choice is used, keyed by option name."""
+    """Return how each choice option is used, keyed by option name."""
     return {entry.name: entry.metadata["use"] for entry in fields(ChoiceOptions)}
