@@ -379,7 +379,7 @@ def _report_untimed(case: Case) -> Iterator[PlacedMessage]:
     the deck has only one contact or wall. d2rpick evaluates a *SENSOR_CONTROL if its *SENSOR_SWITCH depends on the
     time, or on the magnitude of a contact or wall force. It assumes that the parts are rigid while the sensor is on,
     and deformable while it is off; this was not tested with the solver. If you check restarts together with their main
-    deck, d2rpick knows their times: each restart begins at the ENDTIM of the previous run.
+    deck, their switches have times: each restart begins at the ENDTIM of the previous run.
 
     Fix: To judge the switches, give a history with contact forces or part momenta (--history). Check restarts together
     with their main deck, or switch by time (CODE 0).
