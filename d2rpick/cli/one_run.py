@@ -99,8 +99,8 @@ def extract(write_as: str | None, request: Request, output: Output) -> None:
     Other columns are quantities of the whole model, such as kinetic energy, external work and momentum.
 
     If the files contain part momenta, the momentum is the sum over the parts that fly together with the chosen parts.
-    Momenta and kinetic energies of individual parts are not written, so times and errors from this table may differ
-    from times and errors from the run.
+    Momenta and kinetic energies of individual parts are not written.  So times and errors that follow from this table
+    may differ from the values that follow from the run.
 
     Examples
     --------
@@ -267,8 +267,8 @@ def explore(
 ) -> None:
     """Show the best tr, the error and the rigid time for each td.
 
-    In --td-window or, by default, in the flight that contains --td or in the longest flight, d2rpick compares evenly
-    spaced values of td, and every peak of the energy.  It judges each td as `suggest --td` does.  The table lists the
+    d2rpick compares evenly spaced values of td, and every peak of the energy, in --td-window.  The default is the
+    flight that contains --td, else the longest flight.  It judges each td as `suggest --td` does.  The table lists the
     Pareto-optimal pairs: every other pair has a larger error or a shorter rigid time.  d2rpick also names the nearest
     td with half the error.
 

@@ -92,8 +92,8 @@ def _make_elements(keyword: str) -> Example:
 )
 def _check_counts(case: Case) -> Iterator[PlacedMessage]:
     """The second line of *DEFORMABLE_TO_RIGID_AUTOMATIC gives the number of D2R lines (D2R) and of R2D lines (R2D) that
-    follow it, one line per part. If a count is wrong or a line is missing, the solver reads a part from the wrong line,
-    or treats a part line as the next card. If both counts are 0, the card switches no part.
+    follow it, one line per part. If a count is wrong or a line is missing, the solver misreads the lines: it reads a
+    part from the wrong line, or treats a part line as the next card. If both counts are 0, the card switches no part.
 
     Fix: Write one line per part, and set D2R and R2D to the number of these lines.
     """
