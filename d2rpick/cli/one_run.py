@@ -236,7 +236,7 @@ def _finish_answer(
 )
 @options.make_time_option(
     "--td-window",
-    "Explore the times to switch back within this window.  [default: the longest flight]",
+    "Explore the times to switch back within this window.  [default: the flight with --td, or else the longest flight]",
     pair=True,
 )
 @options.make_click_option(

@@ -114,6 +114,10 @@ def test_info_refuses_files_whose_flight_lasts_longer_than_the_energy() -> None:
             "the longest flight, from 0.086 to 0.379, reaches outside",
         ),
         (
+            ("explore", "--td", "0.1", MATSUM, ENERGY),
+            "the flight that contains --td, from 0.086 to 0.379, reaches outside",
+        ),
+        (
             ("parts", "--deck", str(SAMPLES / "oscillator"), MATSUM),
             "this is a folder; give the main deck in it",
         ),

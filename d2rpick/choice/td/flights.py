@@ -99,6 +99,17 @@ def find_longest_flight(
     return start, latest if longest.source == "energy" and latest > start else end
 
 
+def check_chosen_flight(
+    history: History, window: tuple[float, float], around: float | None = None
+) -> None:
+    """Raise RangeError if the ``window`` that `find_longest_flight` returned lies outside the record of the energy."""
+    if around is not None and window[0] < around <= window[1]:
+        subject = "the flight that contains `td`,"
+    else:
+        subject = "the longest flight,"
+    history.check(*window, subject=subject)
+
+
 def has_other_flights(history: History, settings: Settings, td: float) -> bool:
     """Return True if a flight that does not contain ``td`` [time] is long enough for a useful rigid window."""
     for flight in find_flights(history, settings):
