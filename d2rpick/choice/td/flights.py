@@ -12,6 +12,7 @@ from d2rpick.flight.flight import (
     NEVER_FLIES,
     Flight,
     denies_every_flight,
+    describe_hiding_digits,
     find_all_seen,
     list_witnesses,
 )
@@ -81,7 +82,9 @@ def find_longest_flight(
             cure = COPY_AGAIN
         elif denies_every_flight(history):
             reason = f"{reason}: {NEVER_FLIES}"
+            hint = describe_hiding_digits(history)
             cure = "run it without switching, or write the momenta of the parts and choose those that fly"
+            cure = f"{hint}; otherwise, {cure}" if hint else cure
         else:
             cure = "if you know the end of the load, give it as `after`"
         raise RangeError(f"{', '.join(history.source)}: {reason}; {cure}")
