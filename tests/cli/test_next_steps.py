@@ -430,7 +430,7 @@ def test_the_step_to_the_card_keeps_the_merged_part(tmp_path: Path) -> None:
 @pytest.mark.parametrize("text", ["suggest --td 0.37", "explore --td 0.37"])
 def test_verify_and_the_choice_give_one_cure_for_a_pair(text: str) -> None:
     cure = find_line("to improve", "verify", *WITH_CARE, MATSUM)
-    assert cure.startswith("no clearly better pair was found for td from 0.086 to ")
+    assert cure.startswith("nothing clearly better was found for td from 0.086 to ")
     assert find_line("to improve", *text.split(), *FLYING) == cure
     assert find_line("to improve", "suggest", *FLYING) == cure
     assert find_line("to improve", "explore", *FLYING) == cure
