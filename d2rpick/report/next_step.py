@@ -344,7 +344,11 @@ def name_step_after_flight(
 def name_step_without_flight(history: History, question: RepeatedQuestion) -> str:
     """Return the step if no flight is found; the end of the load is asked for unless the momentum shows no flight."""
     # Imported here, because a card without a history needs no numpy.
-    from d2rpick.flight.flight import NEVER_FLIES, denies_every_flight
+    from d2rpick.flight.flight import (
+        NEVER_FLIES,
+        denies_every_flight,
+        describe_hiding_digits,
+    )
     from d2rpick.histories.samples import find_holes
 
     more = ask_for_states_that_show_flight(
@@ -365,6 +369,8 @@ def name_step_without_flight(history: History, question: RepeatedQuestion) -> st
     if not denies_every_flight(history):
         return f"{more}{look}, or give the end of the load as --after"
     no_pair = f"{more}{name_lack_of_pairs(question)}: {NEVER_FLIES}"
+    if hint := describe_hiding_digits(history):
+        return f"{no_pair}; {hint}, or run it without switching"
     if any(momenta.parts for momenta in history.momenta):
         return f"{no_pair}; run it without switching"
     return f"{no_pair}; to find out whether single parts fly, {look}"
