@@ -204,6 +204,18 @@ def test_a_library_stays_behind_its_module(library: str) -> None:
     assert {name_folder(module) for module in importing} <= {*RESERVED[library]}
 
 
+def test_data_classes_share_their_methods() -> None:
+    """Python's own decorator compiles the methods of each class at every start."""
+    compiling = {
+        module
+        for module, path in MODULES.items()
+        if re.search(
+            r"from dataclasses import .*\bdataclass\b", path.read_text("utf-8")
+        )
+    }
+    assert compiling == {"base.data_classes"}
+
+
 def test_what_does_not_ship_is_imported_where_its_absence_is_told() -> None:
     importing = {
         module
