@@ -3,6 +3,7 @@
 import ast
 import compileall
 import importlib
+import platform
 import re
 import subprocess
 import sys
@@ -399,6 +400,18 @@ def run_code(code: str) -> str:
         timeout=TIME_LIMIT,
     )
     return result.stdout
+
+
+def test_reading_hdf5_starts_no_program() -> None:
+    """For `platform.uname`, which h5py calls, Python would start ``uname``; what others read there stays the same."""
+    pytest.importorskip("h5py")
+    code = (
+        "import sys; started = []\n"
+        "sys.addaudithook(lambda event, args: event == 'subprocess.Popen' and started.append(args[0]))\n"
+        f"import d2rpick as d2; d2.read({BOX_HDF5!r}); print(*started)\n"
+        "import platform; print(platform.processor())"
+    )
+    assert run_code(code) == f"\n{platform.processor()}\n"
 
 
 def test_the_package_alone_imports_nothing() -> None:
