@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import os
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import COPY_AGAIN, list_names
 from d2rpick.base.options import make_option_name
+from d2rpick.base.tuples import NamedTuple
 from d2rpick.choice.options import list_uses
 from d2rpick.choice.pair.grades import DO_NOT_USE
 from d2rpick.deck.beside import SOME_NODES, SOME_PARTS, find_deck_beside
