@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, Unpack
 
 from d2rpick.api import arguments
@@ -13,6 +12,7 @@ from d2rpick.api.judged_cards import JudgedCard, judge_and_print
 from d2rpick.api.request import check_window
 from d2rpick.api.run_answer import RunAnswer
 from d2rpick.api.times import TimeArguments
+from d2rpick.base.data_classes import dataclass
 from d2rpick.base.errors import ArgumentError, DeckError
 from d2rpick.base.options import NOT_NEGATIVE
 from d2rpick.choice.td import plan as planning, trade_off

@@ -6,10 +6,11 @@ of `ChoiceOptions`.  This module imports no numerics, since each command needs t
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from functools import cache
 from typing import TYPE_CHECKING, Any, Final
 
+from d2rpick.base.data_classes import dataclass
 from d2rpick.base.options import (
     AT_LEAST_ONE,
     FRACTION,
@@ -92,8 +93,7 @@ def _describe_use(**use: Any) -> dict[str, Use]:
     return {"use": Use(**use)}
 
 
-# The class is not frozen although its objects never change, because frozen classes slow start-up by 2 %.
-@dataclass(init=False, eq=False, repr=False, kw_only=True)
+@dataclass(frozen=True, init=False, eq=False, repr=False, kw_only=True)
 class ChoiceOptions:
     """The options that define how a pair is chosen and judged; times have the unit of the history.
 

@@ -335,8 +335,8 @@ EXPLANATIONS_BY_TOPIC: Final = {
         ),
         "parts-not-joined": Explanation(
             "The card makes several parts rigid, each as a separate rigid body. If they share nodes, they must form "
-            "one rigid body. Without a deck, or if elements of the deck are encrypted or missing, it is unknown whether "
-            "they share nodes.",
+            "one rigid body. Without a deck, or if elements of the deck are encrypted or missing, it is unknown "
+            "whether they share nodes.",
             "Give the deck with all its includes (--deck), or merge the parts with --merge.",
         ),
         "same-leg-twice": Explanation(
