@@ -43,7 +43,7 @@ from d2rpick.cli.values import CARDS
 from d2rpick.report.formats import FORMATS, WrittenDeck, write
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Iterable, Iterator, Mapping
 
     from d2rpick.api.asked import RunQuestion
     from d2rpick.api.cards import Cards
@@ -542,7 +542,7 @@ def plan(
         )
     else:
         if judged_card:
-            output.notes(judged_card.card.notes, ())
+            output.notes(judged_card.card.notes, _select_unknown_by_check(judged_card))
             answer = replace(answer, fewest_cycles=judged_card.card.fewest_cycles)
         times = options.write_times(min_rigid=min_rigid, done=done, before=before)
         output.answer(
@@ -575,6 +575,14 @@ def _select_new_cautions(card: JudgedCard | None, plan: Plan) -> list[Caution]:
         for caution in collect_cautions(card._replace(verdicts=failed))
         if caution not in plan.cautions
     ]
+
+
+def _select_unknown_by_check(card: JudgedCard) -> Iterator[Caution]:
+    """Return the cautions about a card that the check of the deck with the card does not repeat."""
+    # Imported here to keep start-up fast.
+    from d2rpick.api.card_in_deck import NOT_SHOWN_BY_CHECK
+
+    return (caution for caution in card.cautions if caution.code in NOT_SHOWN_BY_CHECK)
 
 
 def _check_form(form: str, folder: str | None, *, every: bool) -> None:

@@ -538,7 +538,7 @@ def name_step_after_card(
         action = f"these times were not judged, because no history was given; {action}"
     files = make_positional([main_deck.name])
     line = quote_shell_line(("d2rpick", "check", *question.checking, *files))
-    if is_separate and not main_deck.hint:
+    if is_separate and not deck and not main_deck.hint:
         again = f"print the card again with --deck {main_deck.name}"
         action = f"if these parts share nodes, {again}, which merges them; {action}"
     elif is_separate:
