@@ -43,7 +43,7 @@ def test_a_word_that_analysts_type_is_found(word: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "question", list_questions(), ids=lambda question: question.title
+    "question", [*list_questions()], ids=lambda question: question.title
 )
 def test_every_frequent_question_has_a_row(question: Question) -> None:
     answer = f"../how-to/{question.page}.md#{make_anchor(question.title)}"
