@@ -338,9 +338,9 @@ def compute_share(modules: frozenset[str]) -> float:
         *(((command, "--help"), "click", 0.12) for command in ("suggest", "explore")),
         (("info", "--help"), "click", 0.075),
         (("check", DECK), "click", 0.175),
-        (("check", "-f", "json", DECK), "click", 0.2),
-        (("rule", "D2R201"), "click", 0.21),
-        ((*CARD, "--part", "1"), "click", 0.12),
+        (("check", "-f", "json", DECK), "click", 0.19),
+        (("rule", "D2R201"), "click", 0.18),
+        ((*CARD, "--part", "1"), "click", 0.105),
         ((*CARD, "--solver", "radioss", "--node", "1", "--end", "1"), "click", 0.12),
         *(
             ((*SUGGEST, "0.064", file), "click, numpy", 0.37)
