@@ -66,7 +66,7 @@ def read_reference(
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Settings(ChoiceOptions):
-    """The analyst's settings: the options of a choice, and the data from the deck of the run.
+    """The analyst's settings: the choice options, and the data from the deck of the run.
 
     ``oscillator`` is given by the user instead of identified. If ``replay`` is False, pairs are judged only by the
     energy level. ``min_quality`` is the lowest grade of a pair that is planned or that a deck may contain. ``bodies``

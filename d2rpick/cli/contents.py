@@ -60,8 +60,8 @@ def extract(write_as: str | None, request: Request, output: Output) -> None:
     Other columns are quantities of the whole model, such as kinetic energy, external work and momentum.
 
     If the files contain part momenta, the momentum is the sum over the parts that fly together with the chosen parts.
-    Momenta and kinetic energies of individual parts are not written, so times and errors of this table may differ from
-    those of the run.
+    Momenta and kinetic energies of individual parts are not written.  So times and errors that follow from this table
+    may differ from the values that follow from the run.
 
     Examples
     --------

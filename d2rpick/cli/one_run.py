@@ -41,7 +41,7 @@ from d2rpick.cli.values import CARDS
 from d2rpick.report.formats import FORMATS, WrittenDeck
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Iterable, Iterator, Mapping
 
     from d2rpick.api.asked import RunQuestion
     from d2rpick.api.cards import Cards
@@ -165,7 +165,8 @@ def _finish_answer(
 )
 @options.make_time_option(
     "--td-window",
-    "Explore the times to switch back within this window.  [default: the longest flight]",
+    "Explore the times to switch back within this window.  [default: the flight that contains --td, else the longest "
+    "flight]",
     pair=True,
 )
 @options.make_click_option(
@@ -195,9 +196,10 @@ def explore(
 ) -> None:
     """Show the best tr, the error and the rigid time for each td.
 
-    In --td-window or, by default, in the flight that contains --td or in the longest flight, d2rpick compares evenly
-    spaced values of td, and every peak of the energy.  It judges each td as `suggest --td` does.  The table lists the
-    pairs that no other pair beats in both error and rigid time.  d2rpick also names the nearest td with half the error.
+    d2rpick compares evenly spaced values of td, and every peak of the energy, in --td-window.  The default is the
+    flight that contains --td, else the longest flight.  It judges each td as `suggest --td` does.  The table lists the
+    Pareto-optimal pairs: every other pair has a larger error or a shorter rigid time.  d2rpick also names the nearest
+    td with half the error.
 
     Examples
     --------
@@ -379,11 +381,12 @@ def parts(tr: float | None, td: float | None, request: Request, output: Output) 
 ))  # fmt: skip
 @click.option(
     "--all", "every", is_flag=True,
-    help="Write all windows, not only the supported ones, with -f value, -f card and --write-deck.",
+    help="With -f value, -f card and --write-deck, write all windows, not only the windows of the next run.",
 )  # fmt: skip
 @options.make_file_option(
     "--done",
-    "File with the windows in which HISTORY was switched, a line 'tr td' for each; d2rpick plans the later windows.",
+    "File with the windows in which HISTORY was switched, one line 'tr td' for each window.  d2rpick plans the later "
+    "windows.",
 )
 @options.make_file_option(
     "--before",
@@ -422,10 +425,10 @@ def plan(
     cards: Cards,
     output: Output,
 ) -> None:
-    """Plan the rigid windows of a run: tr and td of each flight, and whether HISTORY supports them.
+    """Plan the rigid windows of a run: tr and td of each flight, and the run in which each window can be used.
 
-    Only the windows up to the first one that freezes vibration energy are certain: it shifts all later landings.  Run
-    with these windows, then plan the next windows from the switched run with --done.  The output of -f
+    The next run can use the windows up to and including the first window that freezes vibration energy, because this
+    window shifts all later landings.  Plan the later windows from the switched run with --done.  The output of -f
     value, -f card and --write-deck then contains the finished and the new windows.  For a run of d2rpick drive, give
     its journal as --done.
 
@@ -471,7 +474,7 @@ def plan(
         )
     else:
         if judged_card:
-            output.notes(judged_card.card.notes, ())
+            output.notes(judged_card.card.notes, _select_unknown_by_check(judged_card))
             answer = replace(answer, fewest_cycles=judged_card.card.fewest_cycles)
         times = options.write_times(min_rigid=min_rigid, done=done, before=before)
         output.answer(
@@ -504,6 +507,14 @@ def _select_new_cautions(card: JudgedCard | None, plan: Plan) -> list[Caution]:
         for caution in collect_cautions(card._replace(verdicts=failed))
         if caution not in plan.cautions
     ]
+
+
+def _select_unknown_by_check(card: JudgedCard) -> Iterator[Caution]:
+    """Return the cautions about a card that the check of the deck with the card does not repeat."""
+    # Imported here to keep start-up fast.
+    from d2rpick.api.card_in_deck import NOT_SHOWN_BY_CHECK
+
+    return (caution for caution in card.cautions if caution.code in NOT_SHOWN_BY_CHECK)
 
 
 def _check_form(form: str, folder: str | None, *, every: bool) -> None:

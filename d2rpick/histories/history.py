@@ -39,6 +39,10 @@ _TOGETHER: Final = 1 << 14
 _MOST_NAMED: Final = 5
 
 
+# Relative difference of two doubles that were read from the same decimal number [-].
+_SAME_NUMBER: Final = 1e-12
+
+
 class Precision(NamedTuple):
     """The precision with which the numbers of a column were printed.
 
@@ -100,6 +104,22 @@ class Precision(NamedTuple):
 
 
 EXACT = Precision()
+
+
+def find_digits(values: Samples, most: int) -> int:
+    """Return the number of significant digits that restore all ``values``, but no more than ``most``.
+
+    Examples
+    --------
+    >>> find_digits(np.array([2450.0, -0.1717, 0.0]), 17), find_digits(np.array([1 / 3]), 6)
+    (4, 6)
+    """
+    for digits in range(1, most):
+        quanta = Precision(digits).quanta(values)
+        counts = np.divide(values, quanta, out=np.zeros(values.shape), where=quanta > 0)
+        if (np.abs(counts - counts.round()) <= _SAME_NUMBER * np.abs(counts)).all():
+            return digits
+    return most
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -29,7 +29,7 @@ from d2rpick.choice.pair.quality import (
 from d2rpick.choice.pair.situation import AnswerAtTd, Situation, make_look
 from d2rpick.choice.pair.warnings import warn_about_td
 from d2rpick.choice.switched.frozen import RIGID_TIMES
-from d2rpick.choice.td.flights import find_longest_flight
+from d2rpick.choice.td.flights import check_chosen_flight, find_longest_flight
 from d2rpick.choice.td.suggest_td import (
     STEPS,
     find_best_known,
@@ -262,7 +262,7 @@ def explore_run(
         history, settings, around=td, otherwise=None if td is None else record
     )
     if td_window is None:
-        history.check(*window, subject="the longest flight,")
+        check_chosen_flight(history, window, td)
     look = make_look(history, settings, since)
     known_best, inside = find_best_known(look, history, window)
     offered, peaks = list_offered_times(known_best, inside, steps)
