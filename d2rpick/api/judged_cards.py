@@ -167,7 +167,7 @@ def card(
     parts: Parts | None = None,
     **options: Unpack[Judging],
 ) -> JudgedCard:
-    """Print solver input for switching windows, as ``d2rpick card`` does. If a run is given, judge the windows.
+    """Print solver input for rigid windows, as ``d2rpick card`` does. If a run is given, judge the windows.
 
     Parameters
     ----------

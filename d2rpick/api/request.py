@@ -97,7 +97,7 @@ class ReadingOptions:
         *("channels", "NAME|NUMBER"), many=True, instead_of=("part",),
     )  # fmt: skip
     part: tuple[str, ...] = make_option(
-        'Parts to switch: number (3,7), range (10-19), title, "flying" or "all"; energies are added.',
+        'Parts to switch: number (3,7), range (10-19), title, "flying" or "all"; their energies are added.',
         *("parts", "IDS"), many=True, instead_of=("energy",),
     )  # fmt: skip
     flying: tuple[str, ...] = make_option(

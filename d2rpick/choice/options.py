@@ -122,8 +122,8 @@ class ChoiceOptions:
         metadata=_describe_use(of_cards=True),
     )
     tolerance: float = make_option(
-        "Largest error allowed in the deformation kept at tr or, with the basis energy, in its level. Not used with "
-        "the basis modal.",
+        "Largest allowed frozen-deformation error or, with the basis energy, largest allowed level error. Not used "
+        "with the basis modal.",
         FRACTION,
         "L",
         default=0.2,
@@ -160,7 +160,7 @@ class ChoiceOptions:
         metadata=_describe_use(),
     )
     keep_vibration: bool = make_option(
-        "Grade the vibration strictly: do not forgive an error because the next contact has far more energy.",
+        "Grade the vibration by its residual alone, even if the next contact has far more energy than the error.",
         "flag",
         default=False,
         metadata=_describe_use(),
@@ -171,7 +171,7 @@ class ChoiceOptions:
         metadata=_describe_use(of_cards=True, of_sets=False),
     )
     cost_share: float | None = make_option(
-        "Fraction of the CPU time of a step saved while the parts are rigid, to predict the saving.",
+        "Fraction of the CPU time of a time step that is saved while the parts are rigid; predicts the saving.",
         FRACTION,
         "C",
         metadata=_describe_use(of_sets=False, is_advanced=True),

@@ -99,8 +99,8 @@ def extract(write_as: str | None, request: Request, output: Output) -> None:
     Other columns are quantities of the whole model, such as kinetic energy, external work and momentum.
 
     If the files contain part momenta, the momentum is the sum over the parts that fly together with the chosen parts.
-    Momenta and kinetic energies of individual parts are not written, so times and errors of this table may differ from
-    those of the run.
+    Momenta and kinetic energies of individual parts are not written, so times and errors from this table may differ
+    from times and errors from the run.
 
     Examples
     --------
@@ -268,7 +268,8 @@ def explore(
 
     In --td-window or, by default, in the flight that contains --td or in the longest flight, d2rpick compares evenly
     spaced values of td, and every peak of the energy.  It judges each td as `suggest --td` does.  The table lists the
-    pairs that no other pair beats in both error and rigid time.  d2rpick also names the nearest td with half the error.
+    Pareto-optimal pairs: every other pair has a larger error or a shorter rigid time.  d2rpick also names the nearest
+    td with half the error.
 
     Examples
     --------
@@ -450,11 +451,12 @@ def parts(tr: float | None, td: float | None, request: Request, output: Output) 
 ))  # fmt: skip
 @click.option(
     "--all", "every", is_flag=True,
-    help="Write all windows, not only the supported ones, with -f value, -f card and --write-deck.",
+    help="With -f value, -f card and --write-deck, write all windows, not only the windows of the next run.",
 )  # fmt: skip
 @options.make_file_option(
     "--done",
-    "File with the windows in which HISTORY was switched, a line 'tr td' for each; d2rpick plans the later windows.",
+    "File with the windows in which HISTORY was switched, one line 'tr td' for each window.  d2rpick plans the later "
+    "windows.",
 )
 @options.make_file_option(
     "--before",
@@ -493,10 +495,10 @@ def plan(
     cards: Cards,
     output: Output,
 ) -> None:
-    """Plan the rigid windows of a run: tr and td of each flight, and whether HISTORY supports them.
+    """Plan the rigid windows of a run: tr and td of each flight, and the run in which each window can be used.
 
-    Only the windows up to the first one that freezes vibration energy are certain: it shifts all later landings.  Run
-    with these windows, then plan the next windows from the switched run with --done.  The output of -f
+    The next run can use the windows up to and including the first window that freezes vibration energy, because this
+    window shifts all later landings.  Plan the later windows from the switched run with --done.  The output of -f
     value, -f card and --write-deck then contains the finished and the new windows.  For a run of d2rpick drive, give
     its journal as --done.
 

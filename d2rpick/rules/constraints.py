@@ -415,7 +415,7 @@ def _check_separated_joints(case: Case) -> Iterator[PlacedMessage]:
 @make_rule_decorator("D2R122", WARNING, "a switched part on *CONSTRAINED_RIGID_BODIES")
 def _check_merged_bodies(case: Case) -> Iterator[PlacedMessage]:
     """*CONSTRAINED_RIGID_BODIES merges rigid bodies whose parts have *MAT_RIGID. A part that a card makes rigid has a
-    deformable material, so the keyword does not apply to it, and the parts become separate rigid bodies unless the card
+    deformable material, so the keyword does not apply to it. The parts become separate rigid bodies unless the card
     merges them. Source: the vendor's public help on the command that writes this keyword. Not tested with the solver.
 
     Fix: Remove the part from *CONSTRAINED_RIGID_BODIES, and merge the parts with LRB on the card.
