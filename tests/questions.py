@@ -41,6 +41,7 @@ PAGES: Final = {
         "faq-answer": "Verdicts and limits",
         "faq-terms": "Terms",
         "faq-times": "Times",
+        "faq-flights": "Flights",
         "faq-saving": "Saving",
     },
     "model-faq": {
@@ -53,6 +54,7 @@ PAGES: Final = {
         "faq-constraints": "Constraints",
         "faq-rigid": "While rigid",
         "faq-run": "Switched run",
+        "faq-finished": "Finished run",
     },
     "scripts-faq": {
         "faq-scripts": "Scripts and CI",
