@@ -1,4 +1,4 @@
-"""Declare the options of a choice, each with its type, default, help, range and commands.
+"""Declare the choice options, each with its type, default, help, range and commands.
 
 The options of the command line, the keyword arguments of Python and the settings of a choice all follow from the fields
 of `ChoiceOptions`.  This module imports no numerics, since each command needs the table when it starts.
@@ -6,10 +6,11 @@ of `ChoiceOptions`.  This module imports no numerics, since each command needs t
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from functools import cache
 from typing import TYPE_CHECKING, Any, Final
 
+from d2rpick.base.data_classes import dataclass
 from d2rpick.base.options import (
     AT_LEAST_ONE,
     FRACTION,
@@ -92,8 +93,7 @@ def _describe_use(**use: Any) -> dict[str, Use]:
     return {"use": Use(**use)}
 
 
-# The class is not frozen although its objects never change, because frozen classes slow start-up by 2 %.
-@dataclass(init=False, eq=False, repr=False, kw_only=True)
+@dataclass(frozen=True, init=False, eq=False, repr=False, kw_only=True)
 class ChoiceOptions:
     """The options that define how a pair is chosen and judged; times have the unit of the history.
 
@@ -195,5 +195,5 @@ class ChoiceOptions:
 
 @cache
 def list_uses() -> dict[str, Use]:
-    """Return how each option of a choice is used, keyed by option name."""
+    """Return how each choice option is used, keyed by option name."""
     return {entry.name: entry.metadata["use"] for entry in fields(ChoiceOptions)}

@@ -197,8 +197,8 @@ def follow(
     d2rpick prints a line for each event: load, flight with its evidence, recommended switch, contact, restart, no
     output, end.  RUN need not have started.  d2rpick does not start, stop or change anything.
 
-    With --once or --for, the exit code is 0 if the parts fly at the last state.  It is 1 if they do not fly but the
-    run may continue, and 2 if the run has ended without flying parts or RUN does not exist.
+    With --once or --for, the exit code is 0 if the parts fly at the last state.  It is 1 if they do not fly but the run
+    may continue.  It is 2 if the run has ended without flying parts, or if RUN does not exist.
 
     Examples
     --------

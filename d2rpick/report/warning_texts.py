@@ -335,8 +335,9 @@ EXPLANATIONS_BY_TOPIC: Final = {
         ),
         "parts-not-joined": Explanation(
             "The card makes several parts rigid, each as a separate rigid body. If they share nodes, they must form "
-            "one rigid body.",
-            "Give the deck with --deck, or merge the parts with --merge.",
+            "one rigid body. Without a deck, or if elements of the deck are encrypted or missing, it is unknown "
+            "whether they share nodes.",
+            "Give the deck with all its includes (--deck), or merge the parts with --merge.",
         ),
         "same-leg-twice": Explanation(
             "calibrate found the same restart segment or engine run twice. It uses this run once.",

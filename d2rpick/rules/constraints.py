@@ -10,9 +10,10 @@ LRB; the vendor's public modelling rules for rigid bodies, which permit joints b
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import choose_verb, name_units
+from d2rpick.base.tuples import NamedTuple
 from d2rpick.deck.ls_dyna_parts import DELETING_FLAGS, read_merged_bodies
 from d2rpick.rules.base import ERROR, WARNING, Case, PlacedMessage, group_values
 from d2rpick.rules.example import Example, make_deck, write_automatic_card

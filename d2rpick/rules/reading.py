@@ -92,8 +92,8 @@ def _make_elements(keyword: str) -> Example:
 )
 def _check_counts(case: Case) -> Iterator[PlacedMessage]:
     """The second line of *DEFORMABLE_TO_RIGID_AUTOMATIC gives the number of D2R lines (D2R) and of R2D lines (R2D) that
-    follow it, one line per part. If a count is wrong or a line is missing, the solver reads a part from the wrong line,
-    or treats a part line as the next card. If both counts are 0, the card switches no part.
+    follow it, one line per part. If a count is wrong or a line is missing, the solver misreads the lines: it reads a
+    part from the wrong line, or treats a part line as the next card. If both counts are 0, the card switches no part.
 
     Fix: Write one line per part, and set D2R and R2D to the number of these lines.
     """
@@ -379,7 +379,7 @@ def _report_untimed(case: Case) -> Iterator[PlacedMessage]:
     the deck has only one contact or wall. d2rpick evaluates a *SENSOR_CONTROL if its *SENSOR_SWITCH depends on the
     time, or on the magnitude of a contact or wall force. It assumes that the parts are rigid while the sensor is on,
     and deformable while it is off; this was not tested with the solver. If you check restarts together with their main
-    deck, d2rpick knows their times: each restart begins at the ENDTIM of the previous run.
+    deck, their switches have times: each restart begins at the ENDTIM of the previous run.
 
     Fix: To judge the switches, give a history with contact forces or part momenta (--history). Check restarts together
     with their main deck, or switch by time (CODE 0).

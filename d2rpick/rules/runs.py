@@ -338,9 +338,10 @@ def _check_on_again(case: RunCase) -> Iterator[PlacedMessage]:
     (RADIOSS,),
 )
 def _check_step_limit(case: RunCase) -> Iterator[PlacedMessage]:
-    """If nothing deformable is left, the time step grows by 10 % per cycle without limit, and the release at td occurs
-    late. /DTIX limits the time step. This rule also reports a limit above 1 % of the rigid window. It reports a missing
-    limit only if every element lies in a rigid part. Source: runs computed with OpenRadioss (td was 0.26 ms late).
+    """If nothing deformable is left, the time step grows by 10 % per cycle without limit. The release at td then occurs
+    late. The keyword /DTIX limits the time step. This rule also reports a limit above 1 % of the rigid window. It
+    reports a missing limit only if every element lies in a rigid part. Source: runs computed with OpenRadioss (td was
+    0.26 ms late).
 
     Fix: Add /DTIX to the engine file, with a largest time step below 1 % of the rigid window.
     """
