@@ -84,7 +84,7 @@ class Question(NamedTuple):
     def short_answer(self) -> str:
         """The bold text that begins the answer; empty if there is none."""
         found = _SHORT_ANSWER.match(self.answer)
-        text = " ".join(found[1].split()).rstrip(",") if found else ""
+        text = " ".join(found[1].split()).rstrip(",:") if found else ""
         return text if not text or text.endswith(".") else f"{text}."
 
 
