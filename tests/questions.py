@@ -41,6 +41,7 @@ PAGES: Final = {
         "faq-answer": "Verdicts and limits",
         "faq-terms": "Terms",
         "faq-times": "Times",
+        "faq-flights": "Flights",
         "faq-saving": "Saving",
     },
     "model-faq": {
@@ -53,6 +54,7 @@ PAGES: Final = {
         "faq-constraints": "Constraints",
         "faq-rigid": "While rigid",
         "faq-run": "Switched run",
+        "faq-finished": "Finished run",
     },
     "scripts-faq": {
         "faq-scripts": "Scripts and CI",
@@ -81,7 +83,7 @@ class Question(NamedTuple):
     def short_answer(self) -> str:
         """The bold text that begins the answer; empty if there is none."""
         found = _SHORT_ANSWER.match(self.answer)
-        text = " ".join(found[1].split()).rstrip(",") if found else ""
+        text = " ".join(found[1].split()).rstrip(",:") if found else ""
         return text if not text or text.endswith(".") else f"{text}."
 
 

@@ -3,6 +3,7 @@
 import ast
 import compileall
 import importlib
+import platform
 import re
 import subprocess
 import sys
@@ -204,6 +205,18 @@ def test_a_library_stays_behind_its_module(library: str) -> None:
     assert {name_folder(module) for module in importing} <= {*RESERVED[library]}
 
 
+def test_data_classes_share_their_methods() -> None:
+    """Python's own decorator compiles the methods of each class at every start."""
+    compiling = {
+        module
+        for module, path in MODULES.items()
+        if re.search(
+            r"from dataclasses import .*\bdataclass\b", path.read_text("utf-8")
+        )
+    }
+    assert compiling == {"base.data_classes"}
+
+
 def test_what_does_not_ship_is_imported_where_its_absence_is_told() -> None:
     importing = {
         module
@@ -387,6 +400,18 @@ def run_code(code: str) -> str:
         timeout=TIME_LIMIT,
     )
     return result.stdout
+
+
+def test_reading_hdf5_starts_no_program() -> None:
+    """For `platform.uname`, which h5py calls, Python would start ``uname``; what others read there stays the same."""
+    pytest.importorskip("h5py")
+    code = (
+        "import sys; started = []\n"
+        "sys.addaudithook(lambda event, args: event == 'subprocess.Popen' and started.append(args[0]))\n"
+        f"import d2rpick as d2; d2.read({BOX_HDF5!r}); print(*started)\n"
+        "import platform; print(platform.processor())"
+    )
+    assert run_code(code) == f"\n{platform.processor()}\n"
 
 
 def test_the_package_alone_imports_nothing() -> None:

@@ -1,4 +1,4 @@
-"""Define named tuples whose annotations are not evaluated, because evaluation takes most of the import time.
+"""Define named tuples whose methods are not compiled for each class, because that takes most of their import time.
 
 A command imports some forty of them, and start-up is part of the product. A `Record` may inherit fields of other
 records (all with defaults), which come between its own fields without and with defaults.
@@ -6,7 +6,7 @@ records (all with defaults), which come between its own fields without and with 
 
 from __future__ import annotations
 
-from collections import namedtuple
+from operator import itemgetter
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -21,23 +21,63 @@ if TYPE_CHECKING:
         def _asdict(self) -> dict[str, Any]: ...
 else:
 
+    class _Tuple(tuple):
+        """What all named tuples share; it is that of `collections.namedtuple`."""
+
+        __slots__ = ()
+
+        def __new__(cls, /, *in_order, **by_name):
+            if by_name or len(in_order) != len(cls._fields):
+                in_order = cls._complete(in_order, by_name)
+            return tuple.__new__(cls, in_order)
+
+        @classmethod
+        def _complete(cls, in_order, by_name):
+            given = dict(zip(cls._fields, in_order, strict=False))
+            if len(in_order) > len(cls._fields):
+                raise TypeError(f"{cls.__name__}: too many fields in order")
+            if not given.keys().isdisjoint(by_name):
+                raise TypeError(f"{cls.__name__}: a field is given twice")
+            values = {**cls._field_defaults, **given, **by_name}
+            if values.keys() != {*cls._fields}:
+                wrong = ", ".join(sorted(values.keys() ^ {*cls._fields}))
+                raise TypeError(f"{cls.__name__}: unknown or missing: {wrong}")
+            return [values[field] for field in cls._fields]
+
+        @classmethod
+        def _make(cls, values):
+            return cls(*values)
+
+        def _replace(self, /, **changes):
+            return type(self)(**{**self._asdict(), **changes})
+
+        def _asdict(self):
+            return dict(zip(self._fields, self, strict=True))
+
+        def __repr__(self):
+            values = map("{}={!r}".format, self._fields, self)
+            return f"{type(self).__name__}({', '.join(values)})"
+
+        def __getnewargs__(self):
+            return tuple(self)
+
     class _Made(type):
         def __new__(cls, name, bases, body):
             annotated = body.pop("__annotations__")
             own_defaults = {key: body.pop(key) for key in annotated if key in body}
-            inherited, inherited_defaults = [], []
+            inherited = {}
             for base in bases:
-                for field in getattr(base, "_fields", ()):
-                    inherited.append(field)
-                    inherited_defaults.append(base._field_defaults[field])
+                inherited |= getattr(base, "_field_defaults", {})
             required = [field for field in annotated if field not in own_defaults]
-            fields = [*required, *inherited, *own_defaults]
-            defaults = [*inherited_defaults, *own_defaults.values()]
-            record = namedtuple(
-                name, fields, defaults=defaults, module=body.pop("__module__")
-            )
-            for key in body:
-                setattr(record, key, body[key])
-            return record
+            fields = (*required, *inherited, *own_defaults)
+            body |= {
+                "__slots__": (),
+                "__match_args__": fields,
+                "_fields": fields,
+                "_field_defaults": inherited | own_defaults,
+            }
+            for place, field in enumerate(fields):
+                body[field] = property(itemgetter(place))
+            return type(name, (_Tuple,), body)
 
     NamedTuple = Record = type.__new__(_Made, "NamedTuple", (), {})

@@ -54,7 +54,7 @@ def card(
     cards: Cards,
     output: Output,
 ) -> None:
-    """Print solver input for switching windows, ready to be pasted.
+    """Print solver input for rigid windows, ready to be pasted.
 
     With a history, d2rpick judges the times as printed, and adds the verdict as a comment.  With the deck of the run,
     it merges parts that share nodes, and checks the deck with the card in it.  --deck also works without --history.

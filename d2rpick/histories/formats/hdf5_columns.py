@@ -9,12 +9,13 @@ from __future__ import annotations
 import math
 import re
 from functools import cache
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from d2rpick.base.errors import FormatError
 from d2rpick.base.files import describe_unpacked_excess
+from d2rpick.base.tuples import NamedTuple
 from d2rpick.histories.meaning import is_time
 
 if TYPE_CHECKING:
