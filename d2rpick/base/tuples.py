@@ -33,23 +33,27 @@ else:
 
         @classmethod
         def _complete(cls, in_order, by_name):
-            given = dict(zip(cls._fields, in_order, strict=False))
-            if len(in_order) > len(cls._fields):
-                raise TypeError(f"{cls.__name__}: too many fields in order")
-            if not given.keys().isdisjoint(by_name):
-                raise TypeError(f"{cls.__name__}: a field is given twice")
-            values = {**cls._field_defaults, **given, **by_name}
-            if values.keys() != {*cls._fields}:
-                wrong = ", ".join(sorted(values.keys() ^ {*cls._fields}))
-                raise TypeError(f"{cls.__name__}: unknown or missing: {wrong}")
-            return [values[field] for field in cls._fields]
+            values = {**cls._field_defaults, **by_name}
+            rest = cls._fields[len(in_order) :]
+            try:
+                if len(in_order) <= len(cls._fields) and {*rest}.issuperset(by_name):
+                    return (*in_order, *[values[field] for field in rest])
+            except KeyError:
+                pass
+            raise TypeError(
+                f"{cls.__name__}: expected {', '.join(cls._fields)}; "
+                f"given are {len(in_order)} in order, and {', '.join(by_name) or 'none'} by name"
+            )
 
         @classmethod
         def _make(cls, values):
             return cls(*values)
 
         def _replace(self, /, **changes):
-            return type(self)(**{**self._asdict(), **changes})
+            changed = tuple.__new__(type(self), map(changes.pop, self._fields, self))
+            if changes:
+                raise TypeError(f"{type(self).__name__}: no field {', '.join(changes)}")
+            return changed
 
         def _asdict(self):
             return dict(zip(self._fields, self, strict=True))

@@ -40,7 +40,7 @@ _WORK: Final = {
         "Watch a running computation: when the parts fly, when to switch.",
     ),
     "extract": ("contents", "Write the chosen energy as csv or hdf5."),
-    "card": ("decks", "Print solver input for rigid windows."),
+    "card": ("cards", "Print solver input for rigid windows."),
     "first": (
         "running",
         "Write a deck in which the solver chooses the switching times.",

@@ -83,6 +83,8 @@ def test_changed_copies_and_matches_are_those_of_typing() -> None:
         match pair:
             case Ours(first, second) | Theirs(first, second):
                 assert (first, second) == (1, "two")
+        with pytest.raises((TypeError, ValueError), match="third"):
+            pair._replace(third=3)  # type: ignore[call-arg]
         with pytest.raises(AttributeError):
             pair.first = 2  # type: ignore[misc]
     assert [*Ours._make([1, "2"])] == [*Theirs._make([1, "2"])]

@@ -116,6 +116,7 @@ class Columns(Database):
         self._opened, self._content, self.source = opened, content, source
         with _explain_damage(source):
             self._columns = find_columns(opened)
+        self._times = [column for column in self._columns if column.is_time]
         self._named_time: Column | None = None
         if selection.time:
             self._named_time = _find_named_column(selection.time, self._columns, source)
@@ -172,11 +173,7 @@ class Columns(Database):
 
     def _check_own_times(self, column: Column) -> None:
         """Raise FormatError if the times in the group of a column differ from the times of the energy."""
-        times_of_group = [
-            time
-            for time in self._columns
-            if time.is_time and time.group == column.group
-        ]
+        times_of_group = [time for time in self._times if time.group == column.group]
         if len(times_of_group) != 1:
             return
         own_time = times_of_group[0]
@@ -522,7 +519,7 @@ def _read_all_data(file: BinaryIO, source: str) -> None:
         if too_deep := describe_excess("DEPTH", name.count(b"/")):
             raise FormatError(f"{source}: its data lie in {too_deep}")
         if info.type == h5py.h5o.TYPE_DATASET:
-            dataset = h5py.h5d.open(opened.id, name)
+            dataset = h5py.h5d.open(opened, name)
             if dataset.get_create_plist().get_layout() == h5py.h5d.CHUNKED:
                 unpacked += h5py.Dataset(dataset).nbytes
                 if too_much := describe_unpacked_excess(size, unpacked):
@@ -531,8 +528,11 @@ def _read_all_data(file: BinaryIO, source: str) -> None:
                     check_data(h5py.Dataset(dataset), "")
                     h5py.Dataset(dataset)[()]
 
-    with h5py.File(file, "r") as opened:
-        h5py.h5o.visit(opened.id, visit, info=True)
+    # A child process pays for each page of memory that it uses, and `h5py.File` uses many.
+    access = h5py.h5p.create(h5py.h5p.FILE_ACCESS)
+    access.set_fileobj_driver(h5py.h5fd.fileobj_driver, file)
+    opened = h5py.h5f.open(b"content", h5py.h5f.ACC_RDONLY, access)
+    h5py.h5o.visit(opened, visit, info=True)
 
 
 def write(columns: Mapping[str, Samples]) -> bytes:
