@@ -84,8 +84,8 @@ def _follow_switches(
 ) -> Iterator[tuple[float, bool]]:
     """Yield the times at which two sets switch in turn, each with True if the parts become rigid, else False.
 
-    While the conditions of both sets hold, the sets act again and again (chatter). Only the first two switches of such a
-    time are yielded; the next one follows when a force begins or ends.
+    While the conditions of both sets hold, the sets act again and again (chatter). Only the first two of these switches
+    are yielded; the next one follows when a force begins or ends.
     """
     changes = _list_changes(first, second)
     last_time, ready = -math.inf, 0.0

@@ -157,7 +157,7 @@ def test_the_parts_do_not_become_rigid_again_before_the_contact_that_the_offset_
     None
 ):
     timing = find_pair_timing([(0.02, 0.047)], PUSHES)
-    assert timing.windows == ((0.02, pytest.approx(0.047)),)
+    assert flatten_windows(timing.windows) == pytest.approx([0.02, 0.047])
     assert 0.003 < timing.wait < 0.013  # ends in the contact from 0.05 to 0.06
 
 
@@ -167,5 +167,8 @@ def test_the_check_of_a_pair_with_an_offset_ends_and_finds_the_window_of_the_car
     """Before, the check followed the two sets step by step without end, and took all memory."""
     question = ("plan", MATSUM, "--part", "flying", "--deck", str(DECK), *BY_CONTACT)
     written = run(*question, "--write-deck", str(tmp_path / "next"))
-    assert "parts 1, 2: rigid from 0.123689 to 0.37 " in written.stdout
-    assert "D2R208" not in written.stdout
+    checked = " ".join(written.stdout.split()).partition(
+        "rollover_box.k use with care"
+    )[2]
+    assert "parts 1, 2: rigid from 0.123689 to 0.37 (" in checked
+    assert "D2R208" not in checked
