@@ -198,7 +198,7 @@ def _check_sum(
     if np.abs(other[states] - expected_other).max() > _STEADY * deviation:
         return
     energies = [f"{energy:.6g}" for energy in expected_total - other[states]]
-    reason = "by the total energy of the states beside it"
+    reason = "by the total energy of the neighbouring states"
     expected = f"about {' and '.join(energies)} ({reason})"
     raise _make_error(column, first, expected, files, count)
 

@@ -55,7 +55,7 @@ def test_a_damaged_energy_of_a_table_is_named_with_its_line(
     message = refuse(file)
     assert message == (
         f":502: internal energy is {shown} in the single state at 0.05, but about 0.0839331 (by the total energy of "
-        "the states beside it) was expected; repair or delete the line"
+        "the neighbouring states) was expected; repair or delete the line"
     )
     for command in ("plan", "info", "explore"):
         answer = run(command, file)
