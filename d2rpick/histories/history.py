@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import field, fields, replace
 from typing import TYPE_CHECKING, Any, Final, TypeAlias, TypeVar
 
 import numpy as np
 
 from d2rpick.base.caching import cached_property
+from d2rpick.base.data_classes import dataclass
 from d2rpick.base.errors import COPY_AGAIN, HistoryError, RangeError, list_names
 from d2rpick.base.memory import Memory, remember
 from d2rpick.base.tuples import NamedTuple

@@ -42,7 +42,8 @@ _STEADY: Final = 0.1
 _BEYOND_MOMENTA: Final = 10.0
 # A text begins without zero bytes.
 _HEAD: Final = 4096
-_NUMBER: Final = re.compile(rb"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][-+]?\d+)?")
+# This pattern is compiled on first use to keep start-up fast.
+_NUMBER: Final = rb"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][-+]?\d+)?"
 
 
 class CheckedQuantity(NamedTuple):
@@ -267,7 +268,7 @@ def _locate(value: float, time: float, files: Sequence[Source]) -> tuple[str, st
         for number, line in enumerate(bytes(file.data).split(b"\n"), start=1):
             values = [
                 float(word.translate(bytes.maketrans(b"dD", b"ee")))
-                for word in _NUMBER.findall(line)
+                for word in re.findall(_NUMBER, line)
             ]
             if value not in values:
                 continue

@@ -86,7 +86,7 @@ def as_table(checks: Checks, display: DisplayOptions) -> str:
     lines = [line for result in checks.results for line in _format_deck(checks, result)]
     decision, step = [], []
     if checks.results and not display.written_deck:
-        decision = tables.format_in_line([_decide_on_deck(checks)])
+        decision = tables.format_in_line(_decide_on_deck(checks))
         step = [f"next  {_name_next_step(checks)}"]
     return "\n".join(
         [*decision, *map(make_printable, lines), "", *step, summarize_findings(checks)]
@@ -122,8 +122,11 @@ def _format_many_decks(checks: Checks) -> str:
     )
 
 
-def _decide_on_deck(checks: Checks) -> tuple[str, str]:
-    """Return how many errors and warnings a single deck has, and whether a history is missing to judge its times."""
+def _decide_on_deck(checks: Checks) -> list[tuple[str, str]]:
+    """Return how many errors and warnings a single deck has, and whether a history is missing to judge its times.
+
+    If there are none but the times were judged, the verdicts below are the decision.
+    """
     counts = count_severities(checks.results)
     serious = [
         f"{counts[f'{severity}s']} {noun}{'s' * (counts[f'{severity}s'] != 1)}"
@@ -134,8 +137,10 @@ def _decide_on_deck(checks: Checks) -> tuple[str, str]:
     if _lacks_history(checks):
         missing = "; the times were not judged, because no history was given"
     if serious:
-        return "found", f"{' and '.join(serious)}{missing}"
-    return "passed", f"no errors or warnings{missing}"
+        return [("found", f"{' and '.join(serious)}{missing}")]
+    if checks.history is not None and any(result.windows for result in checks.results):
+        return []
+    return [("passed", f"no errors or warnings{missing}")]
 
 
 def _lacks_history(checks: Checks) -> bool:

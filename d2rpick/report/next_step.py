@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import os
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import COPY_AGAIN, list_names
 from d2rpick.base.options import make_option_name
+from d2rpick.base.tuples import NamedTuple
 from d2rpick.choice.options import list_uses
 from d2rpick.choice.pair.grades import DO_NOT_USE
 from d2rpick.deck.beside import SOME_NODES, SOME_PARTS, find_deck_beside
@@ -550,7 +551,7 @@ def name_step_after_card(
         action = f"these times were not judged, because no history was given; {action}"
     files = make_positional([main_deck.name])
     line = quote_shell_line(("d2rpick", "check", *question.checking, *files))
-    if is_separate and not main_deck.hint:
+    if is_separate and not deck and not main_deck.hint:
         again = f"print the card again with --deck {main_deck.name}"
         action = f"if these parts share nodes, {again}, which merges them; {action}"
     elif is_separate:

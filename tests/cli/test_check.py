@@ -905,9 +905,9 @@ def test_a_fair_pair_passes_and_its_verdict_comes_before_any_finding() -> None:
     result = run("check", "fair.k", "--history", MATSUM)
     assert result.exit_code == 0
     lines = result.stdout.splitlines()
-    assert lines[2].startswith("  use with care: parts 1, 2: rigid from ")
-    assert lines[3].startswith("    why         the vibration after td is wrong by ")
-    assert any(line.startswith("    to improve  ") for line in lines[4:9])
+    assert lines[1].startswith("  use with care: parts 1, 2: rigid from ")
+    assert lines[2].startswith("    why         the vibration after td is wrong by ")
+    assert any(line.startswith("    to improve  ") for line in lines[3:8])
 
 
 def test_without_a_history_no_window_has_a_verdict() -> None:

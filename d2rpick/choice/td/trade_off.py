@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import accumulate
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from d2rpick.base.caching import cached_property
+from d2rpick.base.data_classes import dataclass
 from d2rpick.base.errors import Caution, RangeError
 from d2rpick.choice.answers import (
     PairSuggestion,
