@@ -1,4 +1,4 @@
-"""The keyword arguments of Python for the options of a choice, generated from the table of these options.
+"""The keyword arguments of Python for the choice options, generated from the table of these options.
 
 A type checker and an editor read types from the text of a module, so the module is written: ``python -m
 tests.generated_arguments``.

@@ -41,10 +41,12 @@ PAGES: Final = {
         "faq-answer": "Verdicts and limits",
         "faq-terms": "Terms",
         "faq-times": "Times",
+        "faq-flights": "Flights",
         "faq-saving": "Saving",
     },
     "model-faq": {
         "faq-models": "Model",
+        "faq-usual": "Usual cases",
         "faq-options": "Solver options and loads",
         "faq-special": "Special cases",
     },
@@ -53,6 +55,7 @@ PAGES: Final = {
         "faq-constraints": "Constraints",
         "faq-rigid": "While rigid",
         "faq-run": "Switched run",
+        "faq-finished": "Finished run",
     },
     "scripts-faq": {
         "faq-scripts": "Scripts and CI",
@@ -81,7 +84,7 @@ class Question(NamedTuple):
     def short_answer(self) -> str:
         """The bold text that begins the answer; empty if there is none."""
         found = _SHORT_ANSWER.match(self.answer)
-        text = " ".join(found[1].split()).rstrip(",") if found else ""
+        text = " ".join(found[1].split()).rstrip(",:") if found else ""
         return text if not text or text.endswith(".") else f"{text}."
 
 

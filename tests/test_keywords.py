@@ -4,7 +4,8 @@ import re
 
 import pytest
 
-from tests.examples import read_page
+from tests.examples import make_anchor, read_page
+from tests.questions import Question, list_questions
 
 PAGE = "docs/reference/keywords.md"
 ROWS = re.findall(r"^\| \[(.+?)\]\((.+?)\) \| (.+) \|$", read_page(PAGE), re.MULTILINE)
@@ -15,7 +16,8 @@ TYPED_BY_ANALYSTS = """
     HyperStudy; initial velocity; joint; kg mm ms; kinetic energy; landing; license; LS-OPT; mass scaling; messag; MPP;
     nodal rigid body; nodout; oscillation; output interval; plastic strain; plateau; preload; rebound; restart; ringing;
     rollover; rotation; sampling rate; second impact; section force; sensor; Slurm; sloshing; spotweld; springback;
-    time saving; time step; ton mm s; tyre; UMAT; verdict; wheel; Windows
+    time saving; time step; ton mm s; tyre; UMAT; verdict; wheel; Windows; --after; --done; --landing; --margin;
+    --min-quality; --step-cap; --write-deck; /FAIL; /SECT; *CONTROL_TERMINATION; *MAT_RIGID; *SET_PART; HIC; pre-commit
 """
 
 
@@ -35,4 +37,14 @@ def test_the_rows_are_in_alphabetical_order_and_short() -> None:
     "word", [word.strip() for word in TYPED_BY_ANALYSTS.split(";")]
 )
 def test_a_word_that_analysts_type_is_found(word: str) -> None:
-    assert any(word.lower() in words.lower() for words, _, _ in ROWS)
+    assert any(
+        word.lower() in words.lower().replace("\\*", "*") for words, _, _ in ROWS
+    )
+
+
+@pytest.mark.parametrize(
+    "question", [*list_questions()], ids=lambda question: question.title
+)
+def test_every_frequent_question_has_a_row(question: Question) -> None:
+    answer = f"../how-to/{question.page}.md#{make_anchor(question.title)}"
+    assert answer in {target for _, target, _ in ROWS}

@@ -54,6 +54,7 @@ def test_an_answer_begins_with_the_answer_itself(question: Question) -> None:
     assert count_words(question.title) <= LONGEST_QUESTION
     assert 1 <= count_words(question.short_answer) <= LONGEST_SHORT_ANSWER
     assert count_words(question.answer) <= LONGEST_ANSWER
+    assert not question.short_answer.endswith((":.", ",.", ";."))
 
 
 def test_no_two_questions_are_the_same() -> None:

@@ -16,6 +16,8 @@ OBJECTION: Final = "card-objection"
 ERROR_OF_CARD: Final = "card-error"
 UNJOINED: Final = "parts-not-joined"
 UNKNOWN_LEAD: Final = "lead-part-unknown"
+# What a check of the deck with the card cannot show.
+NOT_SHOWN_BY_CHECK: Final = (UNJOINED, UNKNOWN_LEAD)
 # Rule on a part that is rigid from the start: a card that switches it has no effect.
 _NEVER_DEFORMABLE: Final = "D2R107"
 # Largest number of parts that are named in a warning.
@@ -53,8 +55,8 @@ def collect_objections(
 ) -> Iterator[Caution]:
     """Yield the findings of ``check`` for the deck with the card or, without a deck, warnings about what is unknown.
 
-    ``parts`` is the number of parts that the card switches by their ids, ``lead`` the part into which they are merged,
-    and ``known_parts`` are the parts of the history.
+    ``parts`` is the number of parts that the card switches by their ids although nothing shows which of them share
+    nodes, ``lead`` the part into which they are merged, and ``known_parts`` are the parts of the history.
     """
     if deck is None:
         yield from warn_about_lead(lead, (), known_parts)
@@ -65,6 +67,12 @@ def collect_objections(
                 f"{message}; give the main deck as `deck`, or merge the parts with `merge`",
             )
         return
+    if parts > 1:
+        yield Caution(
+            UNJOINED,
+            "d2rpick could not read all elements of the deck, so it is unknown whether these parts share nodes; "
+            "merge parts that do with `merge`",
+        )
     from pathlib import Path
     from tempfile import TemporaryDirectory
 

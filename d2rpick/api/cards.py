@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.api.request import OPTIONS
+from d2rpick.base.data_classes import dataclass
 from d2rpick.base.errors import ArgumentError, DeckError, list_names
 from d2rpick.base.options import (
     POSITIVE,

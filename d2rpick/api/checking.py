@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import os
 import sys
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cache
 from typing import TYPE_CHECKING, Unpack
 
 from d2rpick.api.answer import Answer, build_frame
 from d2rpick.api.cards import SETTINGS
+from d2rpick.base.data_classes import dataclass
 from d2rpick.base.errors import Caution, ConfigurationError, D2RPickError, DeckError
 from d2rpick.base.files import STDIN
 from d2rpick.deck import find_main_decks

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Unpack
 
 from d2rpick.api import arguments
@@ -10,6 +9,7 @@ from d2rpick.api.answer import Answer, Paged, build_frame, write_page
 from d2rpick.api.asked import make_request, read_cost_model
 from d2rpick.api.deck_in_folder import name_deck
 from d2rpick.api.times import TimeArguments
+from d2rpick.base.data_classes import dataclass
 from d2rpick.base.errors import ArgumentError
 from d2rpick.choice.parts import calibration, sets_of_parts
 from d2rpick.choice.parts.cost import Weights, format_weights_as_toml

@@ -5,11 +5,11 @@ from __future__ import annotations
 import errno
 import hashlib
 from contextlib import contextmanager
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from d2rpick.api.answer import Paged
 from d2rpick.api.cards import Cards, parse_id_ranges
+from d2rpick.base.data_classes import dataclass
 from d2rpick.base.errors import Caution, ConfigurationError, D2RPickError
 from d2rpick.choice.parts.cost import CostModel
 from d2rpick.choice.parts.deck_of_run import warn_about_solver

@@ -125,11 +125,12 @@ def judge_and_print(
 
 
 def _count_separate_parts(printing: Printing) -> int:
-    """Return the number of parts that a card switches by their ids without merging them."""
+    """Return the number of parts that a card switches by their ids although nothing shows which of them share nodes."""
     from d2rpick.deck.printing import DEFAULT, SOLVERS
 
     solver = SOLVERS[printing.solver or DEFAULT]
-    return 0 if printing.merge or solver.switches != "part" else len(printing.part)
+    is_known = printing.merge is not None or bool(printing.bodies)
+    return 0 if is_known or solver.switches != "part" else len(printing.part)
 
 
 def _add_bodies(printing: Printing, question: RunQuestion) -> Printing:
@@ -167,7 +168,7 @@ def card(
     parts: Parts | None = None,
     **options: Unpack[Judging],
 ) -> JudgedCard:
-    """Print solver input for switching windows, as ``d2rpick card`` does. If a run is given, judge the windows.
+    """Print solver input for rigid windows, as ``d2rpick card`` does. If a run is given, judge the windows.
 
     Parameters
     ----------

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TYPE_CHECKING, Any
 
 from d2rpick.api.request import OPTIONS, Request
+from d2rpick.base.data_classes import dataclass
 from d2rpick.base.errors import ArgumentError, Caution
 from d2rpick.base.options import (
     NOT_NEGATIVE,

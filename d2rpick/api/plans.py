@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, Unpack
 
 from d2rpick.api import arguments
@@ -13,6 +12,7 @@ from d2rpick.api.judged_cards import JudgedCard, judge_and_print
 from d2rpick.api.request import check_window
 from d2rpick.api.run_answer import RunAnswer
 from d2rpick.api.times import TimeArguments
+from d2rpick.base.data_classes import dataclass
 from d2rpick.base.errors import ArgumentError, DeckError
 from d2rpick.base.options import NOT_NEGATIVE
 from d2rpick.choice.td import plan as planning, trade_off
@@ -112,7 +112,8 @@ def explore(
     td : float or text, optional
         Additional td, with which the others are compared [time].
     td_window : (float, float), optional
-        Range of td [time].  The default is the longest flight or, if there is none but td is given, the whole record.
+        Range of td [time].  The default is the flight that contains td, or else the longest flight; if there is no
+        flight but td is given, the whole record.
     steps : int
         Number of evenly spaced values of td; the peaks of the energy are added.
     parts, flying, deck, weights, **choosing
@@ -152,7 +153,7 @@ def explore_for_question(
     td_window: tuple[float, float] | None,
     steps: int,
 ) -> Exploration:
-    """Find the error and the saving for each td in a range, or in the longest flight."""
+    """Find the error and the saving for each td in a range, or in the flight of td or the longest flight."""
     check_window("td_window", td_window)
     result = trade_off.explore_run(
         question.reference, question.settings, td_window, td=td, steps=steps

@@ -6,9 +6,10 @@ arguments of Python, and the command line that repeats an answer.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from typing import TYPE_CHECKING, Any, Final
 
+from d2rpick.base.data_classes import dataclass
 from d2rpick.base.errors import ArgumentError
 from d2rpick.base.options import (
     NOT_NEGATIVE,
@@ -65,7 +66,7 @@ def _make_oscillator_option(text: str, kind: Number = POSITIVE, *others: str) ->
     return make_option(text, kind, instead_of=(*others, "fit_window", "no_verify"))
 
 
-@dataclass(init=False, eq=False, repr=False, kw_only=True)
+@dataclass(frozen=True, init=False, eq=False, repr=False, kw_only=True)
 class ReadingOptions:
     """The files of a run, and how they are read."""
 
@@ -76,7 +77,7 @@ class ReadingOptions:
         "Use no deck.  [default: the main deck in HISTORY, if that is a folder]",
         *("flag",), default=False, instead_of=("deck",),
     )  # fmt: skip
-    weights: str | Weights | None = make_option(  # noqa: RUF009  the default is a description that is never changed
+    weights: str | Weights | None = make_option(
         "File with the cost per element of each formulation, from d2rpick calibrate.  [default: measured with "
         "OpenRadioss]",
         *("file", "FILE"),
@@ -97,7 +98,7 @@ class ReadingOptions:
         *("channels", "NAME|NUMBER"), many=True, instead_of=("part",),
     )  # fmt: skip
     part: tuple[str, ...] = make_option(
-        'Parts to switch: number (3,7), range (10-19), title, "flying" or "all"; energies are added.',
+        'Parts to switch: number (3,7), range (10-19), title, "flying" or "all"; their energies are added.',
         *("parts", "IDS"), many=True, instead_of=("energy",),
     )  # fmt: skip
     flying: tuple[str, ...] = make_option(
@@ -110,9 +111,7 @@ class ReadingOptions:
     )  # fmt: skip
 
 
-# Objects of this class never change, but the class is not frozen, like the other tables of options.
-# A frozen class of options would increase the start-up time of each command by 2 %.
-@dataclass(eq=False, repr=False, kw_only=True)
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Request(ChoiceOptions, ReadingOptions):
     """A question about a run, with times in the unit of the history; contradictions raise ArgumentError.
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 from d2rpick.api.answer import Paged
 from d2rpick.api.cards import Cards
+from d2rpick.base.data_classes import dataclass
 from d2rpick.base.errors import D2RPickError, DeckError
 
 if TYPE_CHECKING:

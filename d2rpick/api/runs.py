@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import IO, TYPE_CHECKING, Any
 
 from d2rpick.api import arguments
+from d2rpick.base.data_classes import dataclass
 from d2rpick.base.errors import give_if_written
 
 if TYPE_CHECKING:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from functools import partial
 from itertools import chain
 from os.path import abspath
@@ -19,6 +19,7 @@ from d2rpick.api.answer import Paged, build_frame
 from d2rpick.api.asked import make_request
 from d2rpick.api.request import OPTIONS, Request, choose_time_or_window
 from d2rpick.api.times import TimeArguments, find_common_unit
+from d2rpick.base.data_classes import dataclass
 from d2rpick.base.errors import INTERNAL_ERROR, ArgumentError, FormatError
 from d2rpick.base.files import add_checksum, append_as_a_whole, parse_record
 from d2rpick.base.workers import Farm, choose_farm

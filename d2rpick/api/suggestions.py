@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Unpack
 
@@ -14,6 +14,7 @@ from d2rpick.api.judged_cards import JudgedCard, judge_and_print as card_judged
 from d2rpick.api.request import MIN_MEAN_ENERGY, choose_time_or_window
 from d2rpick.api.run_answer import RunAnswer
 from d2rpick.api.times import TimeArguments
+from d2rpick.base.data_classes import dataclass
 from d2rpick.base.errors import ArgumentError, EnergyChoiceError, FormatError
 from d2rpick.base.options import FRACTION
 from d2rpick.choice import answers

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import os
+import pickle
 import signal
 import time
-from concurrent.futures import CancelledError, Future, ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
-from functools import partial
+import warnings
+from collections import deque
+from concurrent.futures import CancelledError
+from contextlib import suppress
 from itertools import islice
 from multiprocessing import (
     Pipe,
@@ -15,32 +17,31 @@ from multiprocessing import (
     get_context,
     set_forkserver_preload,
 )
-from queue import SimpleQueue
+from multiprocessing.connection import wait
 from threading import Thread
-from typing import TYPE_CHECKING, Any, NamedTuple, Self, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, Self, TypeVar, cast
 
 from d2rpick.base.errors import D2RPickError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
     from multiprocessing.connection import Connection
+    from multiprocessing.process import BaseProcess
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 # A fork copies the locks of all threads. Forking from a clean process avoids this and is nearly as fast.
 _METHOD = "forkserver" if "forkserver" in get_all_start_methods() else "spawn"
-# Number of calls queued per process, which keeps the processes busy and the memory small.
+# Number of calls that wait per process, which keeps the processes busy and the memory small.
 _WAITING = 2
 # Smallest number of calls sent to a cluster at a time, because its number of workers may change.
 _LEAST_ON_CLUSTER = 64
-# Largest number of attempts to start a pool; the fork server is restarted after the first attempt.
+# Largest number of attempts to start a process; the fork server is restarted after the first attempt.
 _STARTS = 3
-_DYING = 0.1  # Pause between attempts to start a pool [s], so that the system can finish terminating a killed process.
-# Errors that are raised if a process is started after the fork server was killed.
-_NOT_STARTED = (BrokenProcessPool, EOFError, OSError)
-# Filter, as in PYTHONWARNINGS, for warnings whose text begins with the name of the resource tracker.
-_QUIET_TRACKER = "ignore:resource_tracker:UserWarning"
+# Pause between these attempts [s], so that the system can finish terminating a killed fork server.
+_DYING = 0.1
+_DIED = "its process ended without a result; was there enough memory?"
 # Longest wait for a reply from the scheduler [s].
 _PATIENCE = 10
 
@@ -62,11 +63,34 @@ class Finished(NamedTuple):
 
 
 class _Call(NamedTuple):
-    """A call for one item; ``is_suspect`` is True if the pool that computed it broke."""
+    """A call for one item; ``is_repeated`` is True if the first process that computed it died."""
 
     number: int
     item: Any
-    is_suspect: bool = False
+    is_repeated: bool = False
+
+
+class _Worker:
+    """A process that computes one call at a time, which ``calls`` brings to it and from which its answers come back."""
+
+    def __init__(self, process: BaseProcess, calls: Connection) -> None:
+        self.process, self.calls = process, calls
+        self.call: _Call | None = None
+
+    def begin(self, function: Callable[[Any], Any], call: _Call) -> None:
+        """Send a call; that the process has died is noticed when its answer is awaited."""
+        self.call = call
+        with suppress(OSError):
+            self.calls.send((call.number, function, call.item))
+
+    def take_answer(self) -> Finished | None:
+        """Return the answer to the call, or None if the process has died."""
+        try:
+            answer: Finished = self.calls.recv()
+        except (EOFError, OSError):
+            return None
+        self.call = None
+        return answer
 
 
 class Farm:
@@ -98,141 +122,111 @@ def _compute_call(number: int, function: Callable[[Item], Any], item: Item) -> F
 class Cores(Farm):
     """A pool of processes on this machine, each of which has imported ``module`` before its first call.
 
-    A thread of its own uses the pool.  An interrupt is raised in the main thread at any line, and one that is raised
-    where the main thread holds a lock of the pool would leave it locked, so that the program could never end.
+    Each process has a pipe of its own, so that an interrupt finds no lock that it could leave locked, and so that
+    nothing has to be registered with the resource tracker of Python, which reports with tracebacks if it was killed.
     """
 
     def __init__(self, processes: int, module: str) -> None:
         start_importing(processes, module)
         self.processes, self.room = processes, (1 + _WAITING) * processes
+        self._module = module
         # Closing this end of the pipe makes the processes exit.
         self._held, self._leash = Pipe(duplex=False)
-        self._pool = self._new(processes)
-        self._is_closed = False
+        self._workers: list[_Worker] = []
 
-    def __exit__(self, *exception: object) -> None:
-        """End all processes.
-
-        The thread of the pool is awaited: until Python 3.12, the pool's own handler at exit may use a pipe that this
-        thread is just closing, and prints a traceback.
-        """
-        self._is_closed = True
+    def __exit__(self, *_: object) -> None:
+        """End all processes."""
         self._leash.close()
-        # After an interrupt, the pool's thread may keep its lock for ever, because it waits for a dead process.
-        if KeyboardInterrupt not in exception:
-            self._pool.shutdown(wait=True, cancel_futures=True)
 
     def answers(
         self, function: Callable[[Item], Result], items: Iterable[Item]
     ) -> Iterator[Finished]:
-        """Yield the results of all calls; at most ``room`` calls are computed or queued at the same time.
+        """Yield the results of all calls; at most ``room`` calls are computed or wait at the same time.
 
-        If the process of a call dies, the call is repeated once in a pool of its own: the death breaks a whole pool,
-        and not all of its calls cause it. The process from which others are forked may die too; it is then restarted.
+        If the process of a call dies, the call is repeated once, since something else may have ended the process. The
+        process from which others are forked may die too; it is then restarted.
         """
         queue = enumerate(items)
-        # An interrupt cannot damage these queues, because they are not written in Python.
-        calls = SimpleQueue[_Call | None]()
-        finished = SimpleQueue[Finished | BaseException]()
-        Thread(
-            target=self._compute, args=(function, calls, finished), daemon=True
-        ).start()
+        waiting = deque[_Call]()
         running = 0
         try:
             while True:
                 for number, item in islice(queue, self.room - running):
-                    calls.put(_Call(number, item))
+                    waiting.append(_Call(number, item))
                     running += 1
+                    self._begin_calls(function, waiting)
                 if not running:
                     return
-                answer = finished.get()
-                if isinstance(answer, BaseException):
-                    raise answer
-                running -= 1
-                yield answer
+                answers = self._await_answers(waiting)
+                # The processes compute the next calls while the caller uses these answers.
+                self._begin_calls(function, waiting)
+                running -= len(answers)
+                yield from answers
         finally:
-            calls.put(None)
+            # A process whose answer nobody awaits ends when it sends the answer.
+            self._workers = [worker for worker in self._workers if not worker.call]
 
-    def _compute(
-        self,
-        function: Callable[[Any], Any],
-        calls: SimpleQueue[_Call | None],
-        finished: SimpleQueue[Finished | BaseException],
+    def _begin_calls(
+        self, function: Callable[[Any], Any], waiting: deque[_Call]
     ) -> None:
-        """Compute ``calls`` until None arrives; put each answer, or an error that ends all calls, into ``finished``."""
-
-        def hand_over(call: _Call, future: Future[Any]) -> None:
-            """Pass on the answer to a call, or the call itself if it has to be repeated."""
-            if future.cancelled():
+        """Send the first of the waiting calls to processes without a call; start processes while some are missing."""
+        while waiting:
+            idle = [worker for worker in self._workers if not worker.call]
+            if not idle and len(self._workers) == self.processes:
                 return
-            if isinstance(future.exception(), BrokenProcessPool):
-                calls.put(call._replace(is_suspect=True))
-            else:
-                finished.put(_make_answer(call.number, future))
+            (idle[0] if idle else self._start_worker()).begin(
+                function, waiting.popleft()
+            )
 
-        try:
-            while (call := calls.get()) and not self._is_closed:
-                if call.is_suspect:
-                    finished.put(self._answer_alone(call.number, function, call.item))
+    def _await_answers(self, waiting: deque[_Call]) -> list[Finished]:
+        """Return the answers of all processes that have finished, once there is one.
+
+        The call of a process that has died is put before the waiting ones, or answered with an error if it was already
+        repeated.
+        """
+        busy = {worker.calls: worker for worker in self._workers if worker.call}
+        answers = []
+        for ready in wait(list(busy)):
+            worker = busy[cast("Connection", ready)]
+            call = worker.call
+            answer = worker.take_answer()
+            if call and not answer:
+                self._workers.remove(worker)
+                worker.calls.close()
+                if call.is_repeated:
+                    answer = Finished(call.number, None, D2RPickError(_DIED))
                 else:
-                    future = self._submit(function, call.item)
-                    future.add_done_callback(partial(hand_over, call))
-        except BaseException as error:  # noqa: BLE001  it is raised where the answers are awaited
-            finished.put(error)
+                    waiting.appendleft(call._replace(is_repeated=True))
+            if answer:
+                answers.append(answer)
+        return answers
 
-    def _submit(self, function: Callable[[Item], Result], item: Item) -> Future[Result]:
-        """Submit a call to the pool; if the pool is broken, start a new one."""
-        try:
-            return self._pool.submit(function, item)
-        except _NOT_STARTED:
-            self._pool.shutdown(wait=False)
-            self._pool, future = self._begin_pool(self.processes, function, item)
-            return future
-
-    def _answer_alone(
-        self, number: int, function: Callable[[Item], Result], item: Item
-    ) -> Finished:
-        """Execute a call in a separate pool, so that a crash of its process affects no other call."""
-        pool, future = self._begin_pool(1, function, item)
-        answer = _make_answer(number, future)
-        pool.shutdown(wait=False)
-        return answer
-
-    def _begin_pool(
-        self, processes: int, function: Callable[[Item], Result], item: Item
-    ) -> tuple[ProcessPoolExecutor, Future[Result]]:
-        """Start a pool and submit one call to it; raise D2RPickError if none of its processes can be started."""
+    def _start_worker(self) -> _Worker:
+        """Start a process; raise D2RPickError if it cannot be started."""
+        context: Any = get_context(_METHOD)
         for _ in range(_STARTS):
-            pool = self._new(processes)
+            ours, theirs = Pipe()
             try:
-                return pool, pool.submit(function, item)
-            except _NOT_STARTED as error:
-                pool.shutdown(wait=False)
+                start_importing(self.processes, self._module)
+                process = context.Process(
+                    target=_work, args=(theirs, self._held), daemon=True
+                )
+                process.start()
+            except (EOFError, OSError) as error:
                 time.sleep(_DYING)
                 reason = " ".join(str(error).split())
+            else:
+                self._workers.append(_Worker(process, ours))
+                return self._workers[-1]
+            finally:
+                theirs.close()
         raise D2RPickError(
             f"no process can be started ({reason}); is there a limit on their number?"
         )
 
-    def _new(self, processes: int) -> ProcessPoolExecutor:
-        """Return a new pool."""
-        return ProcessPoolExecutor(
-            processes, get_context(_METHOD), _begin_work, (self._held,)
-        )
 
-
-def _make_answer(number: int, future: Future[Any]) -> Finished:
-    """Return the result or the error of a finished call."""
-    error = future.exception()
-    if isinstance(error, BrokenProcessPool):
-        error = D2RPickError(
-            "its process ended without a result; was there enough memory?"
-        )
-    return Finished(number, None if error else future.result(), error)
-
-
-def _begin_work(held: Connection) -> None:
-    """Exit this process when the other end of ``held`` is closed; an interrupt ends the process without a message."""
+def _work(calls: Connection, held: Connection) -> None:
+    """Compute calls until the other end of ``held`` is closed; an interrupt ends this process without a message."""
     # A spawned process still has Python's own handler; in a forked process, `interruptible` has already replaced it.
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, signal.SIG_DFL)
@@ -243,10 +237,30 @@ def _begin_work(held: Connection) -> None:
         os._exit(1)
 
     Thread(target=follow, daemon=True).start()
+    # The program may end before this process has read or sent anything.
+    with suppress(EOFError, OSError):
+        while True:
+            number, function, item = calls.recv()
+            calls.send_bytes(_pack_answer(_compute_call(number, function, item)))
+
+
+def _pack_answer(answer: Finished) -> bytes:
+    """Return the answer as bytes; an error brings the place at which it was raised, for ``--debug``."""
+    try:
+        if answer.error:
+            from traceback import format_exception
+
+            answer.error.add_note("".join(format_exception(answer.error)))
+            # Some errors can be packed, but not unpacked.
+            pickle.loads(pickle.dumps(answer.error))
+        return pickle.dumps(answer)
+    except Exception as error:  # noqa: BLE001  the program has to learn of any failure
+        reason = f"its answer cannot be sent ({type(error).__name__}: {error})"
+        return pickle.dumps(Finished(answer.number, None, RuntimeError(reason)))
 
 
 def start_importing(processes: int, module: str) -> None:
-    """Import ``module`` in one background process, from which the workers are forked later.
+    """Import ``module`` in one background process, from which the workers are forked later, unless this runs already.
 
     Call this as early as it is known that several processes will be needed; for a single one it does nothing.
     """
@@ -260,30 +274,19 @@ def start_importing(processes: int, module: str) -> None:
 def _start_server(module: str) -> None:
     """Start the process from which others are forked; an interrupt ends it silently, even during its imports."""
     # Windows has no fork server.
-    from multiprocessing import forkserver
+    from multiprocessing import forkserver, resource_tracker
 
     set_forkserver_preload(["d2rpick.base.interruptible", module])
-    _start_tracker()  # The tracker is started first, because starting it unblocks SIGINT.
+    with warnings.catch_warnings():
+        # Python warns if the tracker was killed, but the pool leaves nothing behind that it would have to delete.
+        warnings.filterwarnings("ignore", "resource_tracker", UserWarning)
+        # The tracker is started first, because starting it unblocks SIGINT.
+        resource_tracker.ensure_running()
     mask = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
     try:
         forkserver.ensure_running()
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, mask)
-
-
-def _start_tracker() -> None:
-    """Start the process that deletes the semaphores of a program that was ended, which needs no warning."""
-    from multiprocessing import resource_tracker
-
-    given = os.environ.get("PYTHONWARNINGS")
-    os.environ["PYTHONWARNINGS"] = _QUIET_TRACKER
-    try:
-        resource_tracker.ensure_running()
-    finally:
-        if given is None:
-            del os.environ["PYTHONWARNINGS"]
-        else:
-            os.environ["PYTHONWARNINGS"] = given
 
 
 def choose_farm(processes: int, module: str) -> Farm:

@@ -6,10 +6,11 @@ so that their numbers agree.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, TypeVar
 
 from d2rpick.base.caching import cached_property
+from d2rpick.base.data_classes import dataclass
 from d2rpick.base.errors import Caution, RangeError
 from d2rpick.base.memory import remember
 from d2rpick.base.tuples import NamedTuple

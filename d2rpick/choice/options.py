@@ -1,4 +1,4 @@
-"""Declare the options of a choice, each with its type, default, help, range and commands.
+"""Declare the choice options, each with its type, default, help, range and commands.
 
 The options of the command line, the keyword arguments of Python and the settings of a choice all follow from the fields
 of `ChoiceOptions`.  This module imports no numerics, since each command needs the table when it starts.
@@ -6,10 +6,11 @@ of `ChoiceOptions`.  This module imports no numerics, since each command needs t
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from functools import cache
 from typing import TYPE_CHECKING, Any, Final
 
+from d2rpick.base.data_classes import dataclass
 from d2rpick.base.options import (
     AT_LEAST_ONE,
     FRACTION,
@@ -92,8 +93,7 @@ def _describe_use(**use: Any) -> dict[str, Use]:
     return {"use": Use(**use)}
 
 
-# The class is not frozen although its objects never change, because frozen classes slow start-up by 2 %.
-@dataclass(init=False, eq=False, repr=False, kw_only=True)
+@dataclass(frozen=True, init=False, eq=False, repr=False, kw_only=True)
 class ChoiceOptions:
     """The options that define how a pair is chosen and judged; times have the unit of the history.
 
@@ -122,8 +122,8 @@ class ChoiceOptions:
         metadata=_describe_use(of_cards=True),
     )
     tolerance: float = make_option(
-        "Largest error allowed in the deformation kept at tr or, with the basis energy, in its level. Not used with "
-        "the basis modal.",
+        "Largest allowed frozen-deformation error or, with the basis energy, largest allowed level error. Not used "
+        "with the basis modal.",
         FRACTION,
         "L",
         default=0.2,
@@ -160,7 +160,7 @@ class ChoiceOptions:
         metadata=_describe_use(),
     )
     keep_vibration: bool = make_option(
-        "Grade the vibration strictly: do not forgive an error because the next contact has far more energy.",
+        "Grade the vibration by its residual alone, even if the next contact has far more energy than the error.",
         "flag",
         default=False,
         metadata=_describe_use(),
@@ -171,7 +171,7 @@ class ChoiceOptions:
         metadata=_describe_use(of_cards=True, of_sets=False),
     )
     cost_share: float | None = make_option(
-        "Fraction of the CPU time of a step saved while the parts are rigid, to predict the saving.",
+        "Fraction of the CPU time of a time step that is saved while the parts are rigid; predicts the saving.",
         FRACTION,
         "C",
         metadata=_describe_use(of_sets=False, is_advanced=True),
@@ -195,5 +195,5 @@ class ChoiceOptions:
 
 @cache
 def list_uses() -> dict[str, Use]:
-    """Return how each option of a choice is used, keyed by option name."""
+    """Return how each choice option is used, keyed by option name."""
     return {entry.name: entry.metadata["use"] for entry in fields(ChoiceOptions)}

@@ -34,7 +34,7 @@ from d2rpick.choice.switched.switched_run import (
     select_model_momenta,
 )
 from d2rpick.choice.td.flights import find_flights
-from d2rpick.flight.flight import denies_every_flight
+from d2rpick.flight.flight import denies_every_flight, describe_hiding_digits
 from d2rpick.flight.margin import LEAST_MARGIN
 from d2rpick.flight.momentum import replace_words_by_part_ids
 from d2rpick.flight.window import FreeFlight
@@ -92,7 +92,8 @@ class Overview(NamedTuple):
     which the user has to choose one before the run can be judged; empty if the energy is known.  ``should_write`` names
     the output that would show the flights of single parts; None if it is written, or there is no state.  ``deck`` is
     the main deck of the run that was used, and ``selection`` the columns and parts that the user chose.  ``rigid`` are
-    the windows in which parts are rigid.  ``never_flies`` is True if the momentum shows no flight at any time.
+    the windows in which parts are rigid.  ``never_flies`` is True if the momentum shows no flight at any time;
+    ``hiding_digits`` then says whether it may have too few digits to show one.
     ``holes`` are the intervals without states [time].
     """
 
@@ -119,6 +120,7 @@ class Overview(NamedTuple):
     selection: Selection = Selection()
     rigid: tuple[Times, ...] = ()
     never_flies: bool = False
+    hiding_digits: str = ""
     energies: tuple[str, ...] = ()
     holes: tuple[Times, ...] = ()
 
@@ -140,7 +142,8 @@ class Overview(NamedTuple):
         if not self.flights and not self.complete:
             return "the files end within a state, and no free flight is found in the part that was read"
         if not self.flights:
-            return "no free flight is found, so nothing can be made rigid"
+            reason = "no free flight is found, so nothing can be made rigid"
+            return "; ".join(filter(None, (reason, self.hiding_digits)))
         if self._is_spent:
             return (
                 f"this is a switched run: parts are rigid from {_list_times(self.rigid)}, and no flight follows; "
@@ -236,6 +239,7 @@ def describe_run(
     rigid: tuple[Times, ...] = ()
     flights: tuple[tuple[str, FreeFlight], ...] = ()
     energies: tuple[str, ...] = ()
+    never_flies, hiding_digits = False, ""
     if history:
         rigid = find_rigid_times(Reference(run, history))
         rigid = rigid or find_frozen_times(history)
@@ -249,6 +253,8 @@ def describe_run(
             select_model_momenta(history) if rigid else history
         )
         flaws += tuple(_warn_about_flights_outside(history, flights))
+        never_flies = denies_every_flight(history)
+        hiding_digits = describe_hiding_digits(history) if never_flies else ""
     else:
         flaws, energies = _explain_missing_energy(run, selection)
     channels = dict.fromkeys(chain.from_iterable(d.channels for d in run.databases))
@@ -286,7 +292,8 @@ def describe_run(
         deck=deck,
         selection=selection,
         rigid=rigid,
-        never_flies=history is not None and denies_every_flight(history),
+        never_flies=never_flies,
+        hiding_digits=hiding_digits,
         energies=energies,
         holes=history.holes if history else (),
     )

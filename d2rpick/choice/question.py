@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TYPE_CHECKING, Final
 
+from d2rpick.base.data_classes import dataclass
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.choice.options import ChoiceOptions
 from d2rpick.choice.pair.grades import FAIR
@@ -63,10 +64,9 @@ def read_reference(
     return Reference.of(open_run(names, selection, input_format), selection)
 
 
-# The class is not frozen, because the class of options that it extends is not frozen.
-@dataclass(eq=False, repr=False, kw_only=True)
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Settings(ChoiceOptions):
-    """The analyst's settings: the options of a choice, and the data from the deck of the run.
+    """The analyst's settings: the choice options, and the data from the deck of the run.
 
     ``oscillator`` is given by the user instead of identified. If ``replay`` is False, pairs are judged only by the
     energy level. ``min_quality`` is the lowest grade of a pair that is planned or that a deck may contain. ``bodies``

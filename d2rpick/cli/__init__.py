@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 # Module and summary of each command, so that the help need not import the modules.
 # Commands for one run come first, then commands for many runs and decks, then commands that compute runs.
 _WORK: Final = {
-    "info": ("one_run", "Show what is in the files of a run."),
+    "info": ("contents", "Show what is in the files of a run."),
     "drive": (
         "running",
         "Run a Radioss model and switch its parts at the right times.",
@@ -39,8 +39,8 @@ _WORK: Final = {
         "running",
         "Watch a running computation: when the parts fly, when to switch.",
     ),
-    "extract": ("one_run", "Write the chosen energy as csv or hdf5."),
-    "card": ("decks", "Print solver input for switching windows."),
+    "extract": ("contents", "Write the chosen energy as csv or hdf5."),
+    "card": ("cards", "Print solver input for rigid windows."),
     "first": (
         "running",
         "Write a deck in which the solver chooses the switching times.",

@@ -1,4 +1,4 @@
-"""Define the commands for one run: ``info``, ``extract``, ``suggest``, ``explore``, ``verify``, ``parts``, ``plan``."""
+"""Define the commands that choose times from one run: ``suggest``, ``explore``, ``verify``, ``parts``, ``plan``."""
 
 from __future__ import annotations
 
@@ -23,7 +23,6 @@ from d2rpick.cli import options
 from d2rpick.cli.options import (
     ANSWER,
     DECK,
-    FILES,
     HISTORY,
     ONE_RUN,
     RESULT,
@@ -35,90 +34,20 @@ from d2rpick.cli.output import (
     Output,
     VerdictOnPair,
     check_switched,
-    name_options_and_wrap,
     open_with_output,
 )
 from d2rpick.cli.progress import show_computing, show_reading
 from d2rpick.cli.values import CARDS
-from d2rpick.report.formats import FORMATS, WrittenDeck, write
+from d2rpick.report.formats import FORMATS, WrittenDeck
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Iterable, Iterator, Mapping
 
     from d2rpick.api.asked import RunQuestion
     from d2rpick.api.cards import Cards
     from d2rpick.api.judged_cards import JudgedCard
     from d2rpick.api.plans import Plan
     from d2rpick.base.errors import Caution
-
-
-@options.make_command
-@options.add_options(
-    *("deck", "no_deck", HISTORY, *READING, *RESULT),
-    deck="Main deck of the run, which defines gravity, supports and prescribed motion.",
-    forms=FORMATS["overview"],
-)
-def info(request: Request, output: Output) -> None:
-    """Show whether the HISTORY of a run can be used: flights, format, states, sampling, channels, parts, health.
-
-    Examples
-    --------
-    d2rpick info sample_data/energy.glstat
-    d2rpick info -f json sample_data/rollover.csv
-    """
-    from d2rpick.api.deck_in_folder import name_deck
-
-    selection = request.selection()
-    with open_with_output(request, output) as (run, output):
-        overview = replace(run, chosen=selection).overview(request.deck or False)
-    output.notes((), (*name_deck(request), *overview.cautions))
-    form = output.output_format
-    display = output.shown()
-    output.result(
-        name_options_and_wrap(
-            write("overview", form, overview, display), form, display.width
-        )
-    )
-
-
-@options.make_command
-@options.add_options(HISTORY, *READING)
-@click.option(
-    "--write-as",
-    type=click.Choice(["csv", "hdf5"]),
-    help="Format of the result.  [default: suffix of -o, else csv]",
-)
-@options.add_options(*FILES)
-def extract(write_as: str | None, request: Request, output: Output) -> None:
-    """Write the chosen energy of HISTORY as columns time and internal_energy.
-
-    With several parts, a column part_<id> follows for each.
-
-    Columns not_chosen_part_<id> and not_chosen_spring_<id> follow for the other parts that fly with the chosen parts.
-
-    Other columns are quantities of the whole model, such as kinetic energy, external work and momentum.
-
-    If the files contain part momenta, the momentum is the sum over the parts that fly together with the chosen parts.
-    Momenta and kinetic energies of individual parts are not written, so times and errors of this table may differ from
-    those of the run.
-
-    Examples
-    --------
-    d2rpick extract sample_data/energy.glstat
-    d2rpick extract --energy boxIE_J sample_data/rollover.csv -o box.h5
-    """
-    from d2rpick.api.runs import extract_columns
-    from d2rpick.report.history_files import TABLES, choose_history_format, write_table
-    from d2rpick.report.next_step import name_step_after_extract
-
-    form = choose_history_format(output.output_file, TABLES, write_as)
-    selection = request.selection()
-    with open_with_output(request, output) as (run, output):
-        table, notes = extract_columns(run.files, selection)
-    output.notes(notes, ())
-    output.content(write_table(form, table))
-    if output.file:
-        output.next_step(name_step_after_extract(output.file))
 
 
 @options.make_command
@@ -236,7 +165,8 @@ def _finish_answer(
 )
 @options.make_time_option(
     "--td-window",
-    "Explore the times to switch back within this window.  [default: the longest flight]",
+    "Explore the times to switch back within this window.  [default: the flight that contains --td, else the longest "
+    "flight]",
     pair=True,
 )
 @options.make_click_option(
@@ -266,9 +196,10 @@ def explore(
 ) -> None:
     """Show the best tr, the error and the rigid time for each td.
 
-    In --td-window or, by default, in the flight that contains --td or in the longest flight, d2rpick compares evenly
-    spaced values of td, and every peak of the energy.  It judges each td as `suggest --td` does.  The table lists the
-    pairs that no other pair beats in both error and rigid time.  d2rpick also names the nearest td with half the error.
+    d2rpick compares evenly spaced values of td, and every peak of the energy, in --td-window.  The default is the
+    flight that contains --td, else the longest flight.  It judges each td as `suggest --td` does.  The table lists the
+    Pareto-optimal pairs: every other pair has a larger error or a shorter rigid time.  d2rpick also names the nearest
+    td with half the error.
 
     Examples
     --------
@@ -450,11 +381,12 @@ def parts(tr: float | None, td: float | None, request: Request, output: Output) 
 ))  # fmt: skip
 @click.option(
     "--all", "every", is_flag=True,
-    help="Write all windows, not only the supported ones, with -f value, -f card and --write-deck.",
+    help="With -f value, -f card and --write-deck, write all windows, not only the windows of the next run.",
 )  # fmt: skip
 @options.make_file_option(
     "--done",
-    "File with the windows in which HISTORY was switched, a line 'tr td' for each; d2rpick plans the later windows.",
+    "File with the windows in which HISTORY was switched, one line 'tr td' for each window.  d2rpick plans the later "
+    "windows.",
 )
 @options.make_file_option(
     "--before",
@@ -493,10 +425,10 @@ def plan(
     cards: Cards,
     output: Output,
 ) -> None:
-    """Plan the rigid windows of a run: tr and td of each flight, and whether HISTORY supports them.
+    """Plan the rigid windows of a run: tr and td of each flight, and the run in which each window can be used.
 
-    Only the windows up to the first one that freezes vibration energy are certain: it shifts all later landings.  Run
-    with these windows, then plan the next windows from the switched run with --done.  The output of -f
+    The next run can use the windows up to and including the first window that freezes vibration energy, because this
+    window shifts all later landings.  Plan the later windows from the switched run with --done.  The output of -f
     value, -f card and --write-deck then contains the finished and the new windows.  For a run of d2rpick drive, give
     its journal as --done.
 
@@ -542,7 +474,7 @@ def plan(
         )
     else:
         if judged_card:
-            output.notes(judged_card.card.notes, ())
+            output.notes(judged_card.card.notes, _select_unknown_by_check(judged_card))
             answer = replace(answer, fewest_cycles=judged_card.card.fewest_cycles)
         times = options.write_times(min_rigid=min_rigid, done=done, before=before)
         output.answer(
@@ -575,6 +507,14 @@ def _select_new_cautions(card: JudgedCard | None, plan: Plan) -> list[Caution]:
         for caution in collect_cautions(card._replace(verdicts=failed))
         if caution not in plan.cautions
     ]
+
+
+def _select_unknown_by_check(card: JudgedCard) -> Iterator[Caution]:
+    """Return the cautions about a card that the check of the deck with the card does not repeat."""
+    # Imported here to keep start-up fast.
+    from d2rpick.api.card_in_deck import NOT_SHOWN_BY_CHECK
+
+    return (caution for caution in card.cautions if caution.code in NOT_SHOWN_BY_CHECK)
 
 
 def _check_form(form: str, folder: str | None, *, every: bool) -> None:

@@ -53,14 +53,14 @@ ONE_RUN: Final = ("deck", "no_deck", "weights", HISTORY, *READING, *CHOOSING)
 REFERENCE: Final = ("history", *JUDGING)
 ANSWER: Final = ("plot", "report", *CARDS, *RESULT)
 DECK: Final = (
-    "Main deck of the run (LS-DYNA, or a starter or engine file of Radioss): shows what "
-    "switching saves, and which parts share nodes"
+    "Main deck of the run (LS-DYNA, or a starter or engine file of Radioss), which defines gravity, supports, costs "
+    "and connected parts"
 )
 # Help of the commands that accept the recommended set of parts, which follows from the deck.
 WITH_RECOMMENDED: Final = {
     "deck": f"{DECK}.  `--part recommended` is the set that d2rpick parts recommends.",
     "part": 'Parts to switch: number (3,7), range (10-19), title, "flying", "all" or, with a deck, "recommended"; '
-    "energies are added.",
+    "their energies are added.",
 }
 # Sections of the help; options that belong to no section come first.
 _CARDS: Final = "Cards"
@@ -460,7 +460,7 @@ _FLAGS: Final = [
         ),
         (
             ["-v", "--verbose"],
-            "Print all details, and the files read with their times to stderr.",
+            "Print all details, and on stderr each file that is read, with the time that reading took.",
         ),
     )
 ]

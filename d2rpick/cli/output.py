@@ -6,12 +6,13 @@ import os
 import re
 import sys
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final, Protocol, TextIO
 
 import click
 
 from d2rpick.api.option_names import replace_arguments
+from d2rpick.base.data_classes import dataclass
 from d2rpick.base.errors import (
     FORESEEN,
     ArgumentError,

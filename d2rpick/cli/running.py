@@ -93,12 +93,12 @@ def drive(
     output: Output,
     **driving_options: Any,
 ) -> None:
-    r"""Run a Radioss model without a reference run, because d2rpick switches the parts as the run proceeds.
+    r"""Run a Radioss model without a reference run; d2rpick chooses the switching times as the run proceeds.
 
-    DECK, a starter deck with one engine file, is copied into RUNDIR.  The parts are treated as flying when no force has
-    acted on them for the time --wait.  A rigid probe run then finds the next contact.  The run then continues with
-    deformable parts from one margin before this contact on.  The result is reproducible: the same command
-    gives the same run.  --resume continues an interrupted run.
+    DECK, a starter deck with one engine file, is copied into RUNDIR.  When no force has acted on the parts for the time
+    of --wait, they are treated as flying.  A rigid probe run then finds the next contact.  The parts become deformable
+    one margin before this contact.  The result is reproducible: the same command gives the same run.  --resume
+    continues an interrupted run.
 
     Examples
     --------
@@ -197,8 +197,8 @@ def follow(
     d2rpick prints a line for each event: load, flight with its evidence, recommended switch, contact, restart, no
     output, end.  RUN need not have started.  d2rpick does not start, stop or change anything.
 
-    With --once or --for, the exit code is 0 if the parts fly at the last state.  It is 1 if they do not fly but the
-    run may continue, and 2 if the run has ended without flying parts or RUN does not exist.
+    With --once or --for, the exit code is 0 if the parts fly at the last state.  It is 1 if they do not fly but the run
+    may continue.  It is 2 if the run has ended without flying parts, or if RUN does not exist.
 
     Examples
     --------
@@ -302,9 +302,9 @@ def first(
 ) -> None:
     """Write a copy of DECK that switches the parts in its first run, so that no reference run is needed.
 
-    The solver makes the parts rigid when no contact force has acted for the time --wait, and deformable at the next
-    force.  For Radioss, the copy contains the missing rigid bodies, and engine files for runs that are ended by
-    sensors.  For LS-DYNA, it contains switches with contact codes.
+    The solver makes the parts rigid when no contact force has acted for the time of --wait, and deformable at the next
+    force.  For Radioss, the copy contains the missing rigid bodies, and engine files with sensors that end the engine
+    runs.  For LS-DYNA, the copy contains switches with contact codes.
 
     Examples
     --------

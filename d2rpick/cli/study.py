@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 )
 @options.make_time_option(
     "--td-window",
-    "Let each run choose its time to switch back within this window.",
+    "Choose the time to switch back within this window, for each run.",
     instead_of=("td",),
     pair=True,
 )

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TYPE_CHECKING, Any, Final, Generic, TypeVar
 
 from d2rpick.base.caching import cached_property
+from d2rpick.base.data_classes import dataclass
 from d2rpick.base.graph import find_reachable
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.deck.expression import (
@@ -74,7 +75,6 @@ Problem = tuple[CardField, str]
 """A field that cannot be read, and the reason."""
 
 
-@dataclass(eq=False, repr=False, slots=True)
 class Value(Generic[T]):
     """The value of a field. If ``value`` is a default for an unreadable field, ``problem`` gives the reason.
 
@@ -82,11 +82,29 @@ class Value(Generic[T]):
     message.
     """
 
-    value: T
-    place: CardField | Row
-    problem: str = ""
-    parameters: tuple[str, ...] = ()
-    position: int = 0
+    __slots__ = ("parameters", "place", "position", "problem", "value")
+
+    def __init__(
+        self,
+        value: T,
+        place: CardField | Row,
+        problem: str = "",
+        parameters: tuple[str, ...] = (),
+        position: int = 0,
+    ) -> None:
+        self.value: T = value
+        self.place = place
+        self.problem = problem
+        self.parameters = parameters
+        self.position = position
+
+    def change_to(self, value: T) -> Value[T]:
+        """Return another value for the same field."""
+        return Value(value, self.place, self.problem, self.parameters, self.position)
+
+    def refuse(self, problem: str) -> Value[T]:
+        """Return the value with the reason why it is wrong."""
+        return Value(self.value, self.place, problem, (), self.position)
 
     @property
     def field(self) -> CardField:
@@ -96,15 +114,14 @@ class Value(Generic[T]):
         return self.place
 
 
-@dataclass(eq=False, repr=False, slots=True)
 class Row:
     """One data line of a card."""
 
-    block: Block
-    distance: int
-    text: str
-    width: int
-    _cells: list[str] | None = None
+    __slots__ = ("_cells", "block", "distance", "text", "width")
+
+    def __init__(self, block: Block, distance: int, text: str, width: int) -> None:
+        self.block, self.distance, self.text, self.width = block, distance, text, width
+        self._cells: list[str] | None = None
 
     @property
     def blank(self) -> bool:

@@ -5,10 +5,11 @@ The columns come from the vendor's keyword data as published in its Python libra
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TYPE_CHECKING, Final, Literal
 from weakref import WeakKeyDictionary
 
+from d2rpick.base.data_classes import dataclass
 from d2rpick.base.graph import find_reachable
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.deck.ls_dyna_columns import (

@@ -6,7 +6,7 @@ Element arrays contain the indices of nodes in the node table instead of node id
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, field
+from dataclasses import field
 from itertools import pairwise
 from math import inf
 from typing import TYPE_CHECKING, Final, NamedTuple, TypeVar
@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple, TypeVar
 import numpy as np
 
 from d2rpick.base.caching import cached_property
+from d2rpick.base.data_classes import dataclass
 from d2rpick.base.graph import find_reachable
 from d2rpick.deck.mesh import NO_NODE, Elements, NodeTable, find_distinct
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 import re
 import textwrap
-from dataclasses import dataclass, field
+from dataclasses import field
 from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
+from d2rpick.base.data_classes import dataclass
 from d2rpick.base.errors import DeckError, make_printable
 
 if TYPE_CHECKING:

@@ -78,8 +78,8 @@ _NODE_SETS_DELETED = (
 _SEPARATE = (
     "CHECK BEFORE USE: each part becomes a rigid body of its own (LRB 0). This is",
     "  wrong for parts that share nodes, and nothing shows here whether they do.",
-    "  Give the main deck and a history of these parts (--deck), or merge such",
-    "  parts (d2rpick card --merge). Do not merge loose parts.",
+    "  Merge parts that share nodes (--merge), or give a deck in which d2rpick can",
+    "  read all elements of these parts (--deck). Do not merge loose parts.",
 )
 _RUN_NAME = re.compile(r"[\w.-]+", re.ASCII)
 _OF_RADIOSS = (

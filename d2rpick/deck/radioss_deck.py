@@ -6,10 +6,11 @@ Altair's public help for /RBODY, /PART, /GRNOD and /SUBSET, and from the solver'
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.caching import cached_property
+from d2rpick.base.data_classes import dataclass
 from d2rpick.base.graph import find_reachable
 from d2rpick.deck.card import Card, CardField, Row, Scope, Value
 from d2rpick.deck.columns import cut_fields

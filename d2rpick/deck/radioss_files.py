@@ -24,8 +24,8 @@ RUINS: Final = {
 
 # Number of bytes at the beginning of a file from which the file is recognised.
 HEAD: Final = 256 * 1024
-_KEYWORD: Final = re.compile(rb"^[*/]", re.MULTILINE)
-# These patterns of Radioss keywords are compiled on first use to keep start-up fast.
+# These patterns of keywords are compiled on first use to keep start-up fast.
+_KEYWORD: Final = rb"(?m)^[*/]"
 STARTER: Final = rb"(?mi)^/BEGIN"
 ENGINE: Final = rb"(?mi)^/RUN/"
 _NUMBERED: Final = r"(?is)(.+)_(\d{4})\.rad"
@@ -45,7 +45,7 @@ class Flaw(NamedTuple):
 
 def is_radioss(head: bytes) -> bool:
     """Return True if a file with these first bytes is a starter deck or an engine file."""
-    first = _KEYWORD.search(head)
+    first = re.search(_KEYWORD, head)
     return (
         first is not None
         and first[0] == b"/"

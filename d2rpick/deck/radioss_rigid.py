@@ -8,7 +8,6 @@ the function.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.graph import find_reachable
@@ -145,9 +144,7 @@ def _add_main_nodes(
     for body in in_deck:
         number = numbers.get(body)
         yield (
-            body
-            if number is None
-            else body._replace(node=replace(body.node, value=number))
+            body if number is None else body._replace(node=body.node.change_to(number))
         )
 
 

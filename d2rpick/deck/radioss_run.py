@@ -9,11 +9,12 @@ from __future__ import annotations
 import math
 import os
 import re
-from dataclasses import dataclass, field
+from dataclasses import field
 from itertools import pairwise
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.caching import cached_property
+from d2rpick.base.data_classes import dataclass
 from d2rpick.base.errors import DeckError, choose_verb, format_ranges, name_units
 from d2rpick.deck.card import CardField, Value
 from d2rpick.deck.not_decks import (

@@ -6,11 +6,11 @@ import _thread
 import re
 from bisect import bisect_right
 from contextlib import suppress
-from dataclasses import dataclass
 from itertools import islice, zip_longest
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.caching import cached_property
+from d2rpick.base.data_classes import dataclass
 from d2rpick.base.errors import DeckError
 from d2rpick.base.files import bound, describe_excess, find_long_line
 from d2rpick.deck.not_decks import (

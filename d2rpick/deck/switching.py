@@ -10,10 +10,11 @@ from __future__ import annotations
 
 import re
 from collections import defaultdict
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Final, Literal
 
 from d2rpick.base.caching import cached_property
+from d2rpick.base.data_classes import dataclass
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.deck.card import CardField, Row, Value
 from d2rpick.deck.ls_dyna_columns import (
@@ -286,21 +287,13 @@ def _read_header(card: Card, first: Row, second: Row) -> SwitchHeader:
     values = card.numbers(first, SWITCH_TIMES) + card.numbers(second, SWITCH_COUNTS)
     swset, code, time1, time2, time3, entno, relsw, *further_values = values
     if not code.problem and not BY_TIME <= code.value <= BY_SENSOR:
-        code = replace(
-            code,
-            problem=f"CODE is {code.value}, expected {BY_TIME} to {BY_SENSOR}",
-            parameters=(),
-        )
+        code = code.refuse(f"CODE is {code.value}, expected {BY_TIME} to {BY_SENSOR}")
     if not swset.problem and swset.value <= 0:
-        swset = replace(
-            swset,
-            problem=f"SWSET is {swset.value}, expected a positive number",
-            parameters=(),
-        )
+        swset = swset.refuse(f"SWSET is {swset.value}, expected a positive number")
     if code.value == BY_TIME and not time1.problem and _is_overlong(first):
         next_text = first.cell(SWITCH_TIMES["TIME2"].position)
         problem = f"TIME1 runs over its columns into TIME2 ({time1.field.text} and {next_text})"
-        time1 = replace(time1, problem=problem, parameters=())
+        time1 = time1.refuse(problem)
     swset, relsw = (
         _add_offset(set_id, card.transform.rest) for set_id in (swset, relsw)
     )
@@ -361,7 +354,7 @@ def _add_offset(value: Value[int], offset: int) -> Value[int]:
     """Add the id offset of the include file to an id; 0 stays 0."""
     if value.problem or not value.value or not offset:
         return value
-    return replace(value, value=value.value + offset)
+    return value.change_to(value.value + offset)
 
 
 def _make_switch_set(

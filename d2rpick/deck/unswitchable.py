@@ -12,8 +12,9 @@ switched back). This was not tested with LS-DYNA.
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
+from d2rpick.base.tuples import NamedTuple
 from d2rpick.deck.ls_dyna_columns import MATERIAL
 from d2rpick.deck.ls_dyna_parts import DeckParts, name_material, read_sections
 from d2rpick.deck.radioss_columns import SOLID_FLAGS

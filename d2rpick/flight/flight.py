@@ -262,7 +262,11 @@ def _explain_refusal(witness: Witness, td: float) -> str:
     contradiction = witness.explain_contradiction(td)
     if contradiction:
         return contradiction
-    return f"the {name_source(witness.source)} shows no free flight at td = {td:.6g}"
+    refusal = f"the {name_source(witness.source)} shows no free flight at td = {td:.6g}"
+    hint = ""
+    if witness.source == "momentum":
+        hint = describe_hiding_digits(witness.history, td)
+    return f"{refusal}; {hint}" if hint else refusal
 
 
 def find_all_seen(history: History) -> tuple[tuple[str, FreeFlight], ...]:
@@ -306,6 +310,18 @@ def denies_every_flight(history: History) -> bool:
         witness.source == "momentum" and witness.decisive and not witness.flights()
         for witness in list_witnesses(history)
     )
+
+
+def describe_hiding_digits(history: History, td: float | None = None) -> str:
+    """Return that the momentum may have too few digits to show a flight, around ``td`` if given; otherwise ""."""
+    from d2rpick.flight import momentum
+
+    for momenta in momentum.select_momenta_for_flight(history.momenta):
+        digits = momentum.find_hiding_digits(momenta, td, history.balance)
+        if digits is not None:
+            count = f"{digits} significant digit{'s' * (digits != 1)}"
+            return f"the {count} of the momentum may be too few to show a flight: write more digits"
+    return ""
 
 
 def _can_deny(witness: Witness, flight: FreeFlight) -> bool:

@@ -6,6 +6,7 @@ of parts flies.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Final
 
@@ -25,6 +26,7 @@ from d2rpick.flight.window import (
     limit_to_unheld,
     list_moments,
 )
+from d2rpick.histories.history import Precision, find_digits
 from d2rpick.histories.samples import find_stretches, find_window, remove_line
 
 if TYPE_CHECKING:
@@ -247,6 +249,29 @@ def can_deny_flight(momenta: Momenta) -> bool:
     change = momenta.change(momenta.chosen)
     noise = momenta.noise(momenta.chosen)
     return momenta.time.size >= FEWEST and change > VISIBLE * noise
+
+
+def find_hiding_digits(
+    momenta: Momenta, td: float | None, balance: Balance | None = None
+) -> int | None:
+    """Return the number of significant digits of the momenta if they may hide the flight around ``td``; otherwise None.
+
+    The digits may hide a flight if they are too coarse to show any, or if a flight is found as soon as their rounding
+    error is allowed for. A column may have fewer digits than the rest of its file. Without td, any flight counts.
+    """
+    digits = find_digits(momenta.values, momenta.precision.digits)
+    rounded = replace(momenta, precision=Precision(digits))
+    members = momenta.chosen
+    extent = float(np.ptp(momenta.of(members), axis=0).max())
+    if rounded.noise(members) > TOLERANCE * extent:
+        return digits
+    if digits == momenta.precision.digits:
+        return None
+    if td is None:
+        is_hidden = bool(find_all_flights(rounded, balance))
+    else:
+        is_hidden = find_flight_around(rounded, td, balance) is not None
+    return digits if is_hidden else None
 
 
 def _has_clear_motion(momenta: Momenta, members: Sequence[int], noise: float) -> bool:

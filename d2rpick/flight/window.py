@@ -101,10 +101,11 @@ class Law:
 
     def misfit(self, first: int, last: int) -> float:
         """Return the largest deviation of states ``first`` to ``last`` (in any order) from the best fit of the law."""
-        window = min(first, last), max(first, last)
-        if window not in self._misfits:
-            self._misfits[window] = self._misfit(*window)
-        return self._misfits[window]
+        window = (first, last) if first < last else (last, first)
+        misfit = self._misfits.get(window)
+        if misfit is None:
+            misfit = self._misfits[window] = self._misfit(*window)
+        return misfit
 
     def _misfit(self, first: int, last: int) -> float:
         """Compute the misfit of states in ascending order."""
@@ -394,20 +395,21 @@ def _measure_length(time: Samples, window: tuple[int, int]) -> float:
 def find_farthest(start: int, limit: int, fits: Callable[[int], bool]) -> int:
     """Find the farthest index from ``start`` towards ``limit`` that fits, by doubling and then halving the step."""
     sign = 1 if limit > start else -1
-    good = start
+    farthest = abs(limit - start)
+    good = 0  # distance from the start
     step = 1
-    while good != limit:
-        ahead = good + sign * min(step, abs(limit - good))
-        if not fits(ahead):
+    while good < farthest:
+        ahead = min(good + step, farthest)
+        if not fits(start + sign * ahead):
             break
         good = ahead
-        step = 2 * step
+        step *= 2
     while step > 1:
         step //= 2
-        ahead = good + sign * min(step, abs(limit - good))
-        if ahead != good and fits(ahead):
+        ahead = min(good + step, farthest)
+        if ahead != good and fits(start + sign * ahead):
             good = ahead
-    return good
+    return start + sign * good
 
 
 def limit_to_unheld(

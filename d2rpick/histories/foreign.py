@@ -71,112 +71,164 @@ _DECK: Final = rb"\*[A-Za-z][A-Za-z_]{2}|#RADIOSS|/BEGIN|/[A-Z]{3,8}(?:/|\s|\Z)"
 
 
 class ForeignFormat(NamedTuple):
-    """A file format without an energy history; ``pattern`` matches the first bytes of its files."""
+    """A file format without an energy history: its files begin with one of the ``marks``.
 
-    pattern: bytes
+    With a ``pattern``, the marks are somewhere in the first bytes, which the pattern matches. Patterns are compiled
+    only for files with such a mark, to keep start-up fast.
+    """
+
+    marks: tuple[bytes, ...]
     name: str
     cure: str
+    pattern: bytes = b""
+
+    def is_format_of(self, head: bytes) -> bool:
+        """Return True if a file with these first bytes has this format."""
+        if not self.pattern:
+            return head.startswith(self.marks)
+        return (
+            any(mark in head for mark in self.marks)
+            and re.match(self.pattern, head, re.DOTALL) is not None
+        )
 
 
 # Formats that are recognised by their first bytes, from the most specific to the most general.
 _BINARY_FORMATS: Final = (
     ForeignFormat(
-        rb"PK\x03\x04.{0,2000}(xl/|\[Content_Types\])", "an Excel workbook", _SAVE_SHEET
+        (b"PK\x03\x04",),
+        "an Excel workbook",
+        _SAVE_SHEET,
+        rb"PK\x03\x04.{0,2000}(xl/|\[Content_Types\])",
     ),
     ForeignFormat(
-        rb"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", "an Excel workbook", _SAVE_SHEET
+        (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1",), "an Excel workbook", _SAVE_SHEET
     ),
     ForeignFormat(
-        rb"PK\x03\x04.{0,80}\.npy", "an archive of numpy arrays (npz)", _FROM_FRAME
+        (b"PK\x03\x04",),
+        "an archive of numpy arrays (npz)",
+        _FROM_FRAME,
+        rb"PK\x03\x04.{0,80}\.npy",
     ),
     ForeignFormat(
-        rb"PK\x03\x04", "a zip archive", "unpack it and name the history in it"
+        (b"PK\x03\x04",), "a zip archive", "unpack it and name the history in it"
     ),
     ForeignFormat(
+        (b"7z\xbc\xaf", b"BZh", b"\xfd7zXZ"),
+        "a packed file",
+        "unpack it first: only gzip is read as it is",
         rb"7z\xbc\xaf|BZh[1-9]1AY|\xfd7zXZ",
+    ),
+    ForeignFormat(
+        (b"\x28\xb5\x2f\xfd",),
         "a packed file",
         "unpack it first: only gzip is read as it is",
     ),
     ForeignFormat(
-        rb"\x28\xb5\x2f\xfd",
-        "a packed file",
-        "unpack it first: only gzip is read as it is",
-    ),
-    ForeignFormat(
-        rb"PAR1",
+        (b"PAR1",),
         "a parquet file",
         "write it as csv: pandas.read_parquet(...).to_csv(...)",
     ),
     ForeignFormat(
-        rb"ARROW1|FEA1|\xff\xff\xff\xff.{3}\0\x10\0\0\0", "an arrow file", _FROM_FRAME
+        (b"ARROW1", b"FEA1", b"\xff\xff\xff\xff"),
+        "an arrow file",
+        _FROM_FRAME,
+        rb"ARROW1|FEA1|\xff\xff\xff\xff.{3}\0\x10\0\0\0",
     ),
-    ForeignFormat(rb"\x93NUMPY", "a numpy array (npy)", _FROM_FRAME),
+    ForeignFormat((b"\x93NUMPY",), "a numpy array (npy)", _FROM_FRAME),
     ForeignFormat(
-        rb"HKSRD0",
+        (b"HKSRD0",),
         "an output database of Abaqus (odb)",
         "write an XY report of ALLIE, ALLKE and ALLWK",
     ),
-    ForeignFormat(rb"SQLite format 3\0", "an SQLite database", _FROM_FRAME),
+    ForeignFormat((b"SQLite format 3\0",), "an SQLite database", _FROM_FRAME),
     ForeignFormat(
-        rb"MATLAB 5\.0 MAT-file",
+        (b"MATLAB 5.0 MAT-file",),
         "a MAT-file of MATLAB before version 7.3",
         "save it with -v7.3, or as csv",
     ),
     ForeignFormat(
-        rb"\x80[\x02-\x05][\x80-\xff(\x5d\x7d]",
+        (b"\x80",),
         "a pickle of Python, which is never loaded",
         _FROM_FRAME,
+        rb"\x80[\x02-\x05][\x80-\xff(\x5d\x7d]",
     ),
-    ForeignFormat(rb"TDSm|MDF    ", "a file of measured data", _EXPORT),
+    ForeignFormat((b"TDSm", b"MDF    "), "a file of measured data", _EXPORT),
     ForeignFormat(
-        rb"CDF[\x01\x02\x05]", "a file of netCDF 3", "write it as netCDF 4, or as csv"
+        (b"CDF",),
+        "a file of netCDF 3",
+        "write it as netCDF 4, or as csv",
+        rb"CDF[\x01\x02\x05]",
     ),
-    ForeignFormat(rb"%PDF|\x89PNG|\xff\xd8\xff", "a document or picture", _EXPORT),
     ForeignFormat(
-        rb"\0\0\x54[\x26-\x2f]", "an animation file of Radioss", _NAME_TIME_HISTORY
+        (b"%PDF", b"\x89PNG", b"\xff\xd8\xff"), "a document or picture", _EXPORT
+    ),
+    ForeignFormat(
+        (b"\0\0\x54",),
+        "an animation file of Radioss",
+        _NAME_TIME_HISTORY,
+        rb"\0\0\x54[\x26-\x2f]",
     ),
 )
 
 # Formats that are recognised by their first lines.
 _TEXT_FORMATS: Final = (
     ForeignFormat(
-        rb"(?:Data format edition number|(?:Test object number|Name of the channel|Channel code)\s*:).*",
+        (
+            b"Data format edition number",
+            b"Test object number",
+            b"Name of the channel",
+            b"Channel code",
+        ),
         "a channel or header of ISO-MME",
         "write time and values as csv",
+        rb"(?:Data format edition number|(?:Test object number|Name of the channel|Channel code)\s*:).*",
     ),
     ForeignFormat(
-        rb"\s*-1 *\r?\n\s*\d{1,5}\s*\r?\n", "a universal file (UNV)", _EXPORT
+        (b"-1",), "a universal file (UNV)", _EXPORT, rb"\s*-1 *\r?\n\s*\d{1,5}\s*\r?\n"
     ),
     ForeignFormat(
-        rb"\s*Abaqus/(?:Explicit|Standard).*?INCREMENT",
+        (b"Abaqus/",),
         "a status file of Abaqus (.sta), which has no internal energy",
         "write an XY report of ALLIE, ALLKE and ALLWK from the odb",
+        rb"\s*Abaqus/(?:Explicit|Standard).*?INCREMENT",
     ),
     ForeignFormat(
-        rb".{0,4000}\bLS-DYNA, A Program for Nonlinear Dynamic",
+        (b"LS-DYNA, A Program for Nonlinear Dynamic",),
         "a listing of LS-DYNA (d3hsp or messag)",
         _NAME_DATABASE,
+        rb".{0,4000}\bLS-DYNA, A Program for Nonlinear Dynamic",
     ),
     ForeignFormat(
-        rb"\s*\*{20,}.{0,4000}(?i:radioss)|\s*\*\* CUMULATIVE CPU TIME|.{0,8000}\bCYCLE +TIME +TIME-STEP",
+        (b"*" * 20, b"** CUMULATIVE CPU TIME", b"TIME-STEP"),
         "a listing of Radioss (.out)",
         _NAME_TIME_HISTORY,
+        rb"\s*\*{20,}.{0,4000}(?i:radioss)|\s*\*\* CUMULATIVE CPU TIME|.{0,8000}\bCYCLE +TIME +TIME-STEP",
     ),
     ForeignFormat(
-        rb"\s*[{\[]\s*[\"{\[\]}]", "a JSON document", "write time and energy as csv"
-    ),
-    ForeignFormat(
-        rb"\s*\[[\s\d.eE+,-]*(?:\]|\Z)",
+        (b"{", b"["),
         "a JSON document",
         "write time and energy as csv",
+        rb"\s*[{\[]\s*[\"{\[\]}]",
     ),
     ForeignFormat(
-        rb"\s*<(?:\?xml|!DOCTYPE|html|VTKFile|SOLUTION)",
+        (b"[",),
+        "a JSON document",
+        "write time and energy as csv",
+        rb"\s*\[[\s\d.eE+,-]*(?:\]|\Z)",
+    ),
+    ForeignFormat(
+        (b"<",),
         "an XML or HTML document",
         _EXPORT,
+        rb"\s*<(?:\?xml|!DOCTYPE|html|VTKFile|SOLUTION)",
     ),
-    ForeignFormat(rb"# vtk DataFile", "a VTK file", _EXPORT),
-    ForeignFormat(rb"ISO-10303|solid \w+\s*\n\s*facet", "a geometry", _EXPORT),
+    ForeignFormat((b"# vtk DataFile",), "a VTK file", _EXPORT),
+    ForeignFormat(
+        (b"ISO-10303", b"solid "),
+        "a geometry",
+        _EXPORT,
+        rb"ISO-10303|solid \w+\s*\n\s*facet",
+    ),
 )
 
 
@@ -211,7 +263,7 @@ def refuse_foreign(source: str, head: bytes) -> None:
 def _refuse(source: str, head: bytes, formats: tuple[ForeignFormat, ...]) -> None:
     """Raise FormatError if a file has one of these formats."""
     for foreign in formats:
-        if re.match(foreign.pattern, head, re.DOTALL):
+        if foreign.is_format_of(head):
             raise FormatError(
                 f"{source}: this is {foreign.name}, but an energy history was expected; {foreign.cure}"
             )

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import field, fields, replace
 from typing import TYPE_CHECKING, Any, Final, TypeAlias, TypeVar
 
 import numpy as np
 
 from d2rpick.base.caching import cached_property
+from d2rpick.base.data_classes import dataclass
 from d2rpick.base.errors import COPY_AGAIN, HistoryError, RangeError, list_names
 from d2rpick.base.memory import Memory, remember
 from d2rpick.base.tuples import NamedTuple
@@ -36,6 +37,10 @@ _STILL: Final = 1e-6
 _TOGETHER: Final = 1 << 14
 # Largest number of parts that the name of an energy lists.
 _MOST_NAMED: Final = 5
+
+
+# Relative difference of two doubles that were read from the same decimal number [-].
+_SAME_NUMBER: Final = 1e-12
 
 
 class Precision(NamedTuple):
@@ -99,6 +104,22 @@ class Precision(NamedTuple):
 
 
 EXACT = Precision()
+
+
+def find_digits(values: Samples, most: int) -> int:
+    """Return the number of significant digits that restore all ``values``, but no more than ``most``.
+
+    Examples
+    --------
+    >>> find_digits(np.array([2450.0, -0.1717, 0.0]), 17), find_digits(np.array([1 / 3]), 6)
+    (4, 6)
+    """
+    for digits in range(1, most):
+        quanta = Precision(digits).quanta(values)
+        counts = np.divide(values, quanta, out=np.zeros(values.shape), where=quanta > 0)
+        if (np.abs(counts - counts.round()) <= _SAME_NUMBER * np.abs(counts)).all():
+            return digits
+    return most
 
 
 @dataclass(frozen=True, eq=False, repr=False)

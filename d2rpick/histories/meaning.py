@@ -47,17 +47,18 @@ _ENERGY_WORDS: Final = frozenset(
 _TIME_WORDS: Final = frozenset(
     {"total", "simulation", "simulated", "sim", "analysis", "elapsed", "current", "physical", "solution", "whole"}
 )  # fmt: skip
+# The patterns below are compiled on first use to keep start-up fast.
 # Pattern of a number before a name, as in "2. Kinetic energy" or "Curve 2: KE".
-_NUMBERING: Final = re.compile(r"(?i)^\s*(?:(?:curve|plot|line)\s*)?#?\d+\s*[.:)-]\s+")
+_NUMBERING: Final = r"(?i)^\s*(?:(?:curve|plot|line)\s*)?#?\d+\s*[.:)-]\s+"
 # Pattern of the name of a Radioss time history file, such as T01.
-_SOURCE: Final = re.compile(r"t\d\d")
+_SOURCE: Final = r"t\d\d"
 # Names of datasets that hold the values of the quantity after which their group is named, as in H5MD.
 _UNNAMED_STEPS: Final = frozenset({"value", "values", "data", "res", "y"})
 # Names of datasets that are stored next to the values and contain no quantity.
 _STEPS_BESIDE: Final = frozenset({"step", "steps", "count", "error", "index", "cycle"})
 
-_WORD: Final = re.compile(r"[^\W_]+")
-_CAMEL_CASE: Final = re.compile(r"(?<=[a-zà-ÿ])(?=[A-Z])")
+_WORD: Final = r"[^\W_]+"
+_CAMEL_CASE: Final = r"(?<=[a-zà-ÿ])(?=[A-Z])"
 # Accented letters and the letters that replace them, because files often lose accents.
 _PLAIN_LETTERS: Final = str.maketrans(
     "àáâãäåçèéêëìíîïñòóôõöùúûüýÿąćęłńśźżčšžř", "aaaaaaceeeeiiiinooooouuuuyyacelnszzcszr"
@@ -132,9 +133,9 @@ def find_meaning(name: str) -> Meaning | None:
 
 def _split_words(name: str) -> list[str]:
     """Split a name into lower-case words without accents and unit; "totalKineticEnergy" gives three words."""
-    text = _CAMEL_CASE.sub(" ", remove_unit(_NUMBERING.sub("", name)))
+    text = re.sub(_CAMEL_CASE, " ", remove_unit(re.sub(_NUMBERING, "", name)))
     text = text.casefold().translate(_PLAIN_LETTERS)
-    return [word for word in _WORD.findall(text) if not _SOURCE.fullmatch(word)]
+    return [word for word in re.findall(_WORD, text) if not re.fullmatch(_SOURCE, word)]
 
 
 def _match_words(words: Sequence[str]) -> Meaning | None:

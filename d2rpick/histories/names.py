@@ -85,9 +85,10 @@ QUANTITIES: Final[Mapping[str, frozenset[str]]] = {
     "mass": frozenset({"mass", "totalmass", "masse", "gesamtmasse"}),
 }  # fmt: skip
 
-_BRACKETS = re.compile(r"[(\[]\s*([^()\[\]]*?)\s*[)\]]")
-_TAIL = re.compile(r"^(.*[^/_,\s])\s*[/_,\s]\s*([^/_,\s]+)$")
-_TWO_WORD_UNIT = re.compile(r"[/_,\s]\s*(k?N\s+m{1,2})$")
+# These patterns are compiled on first use to keep start-up fast.
+_BRACKETS: Final = r"[(\[]\s*([^()\[\]]*?)\s*[)\]]"
+_TAIL: Final = r"^(.*[^/_,\s])\s*[/_,\s]\s*([^/_,\s]+)$"
+_TWO_WORD_UNIT: Final = r"[/_,\s]\s*(k?N\s+m{1,2})$"
 
 # Smallest number of leading letters that can identify a name.
 _SHORTEST_BEGINNING: Final = 3
@@ -106,13 +107,15 @@ def find_unit(name: str) -> str:
     ['J', '', '']
     """
     name = name.strip()
-    brackets = [match for match in _BRACKETS.finditer(name) if match.end() == len(name)]
+    brackets = [
+        match for match in re.finditer(_BRACKETS, name) if match.end() == len(name)
+    ]
     if brackets:
         return brackets[0][1] if re.fullmatch(_UNIT, brackets[0][1]) else ""
-    two_words = _TWO_WORD_UNIT.search(name)
+    two_words = re.search(_TWO_WORD_UNIT, name)
     if two_words:
         return two_words[1]
-    tail = _TAIL.match(name)
+    tail = re.match(_TAIL, name)
     return tail[2] if tail and tail[2].casefold() in _UNITS else ""
 
 
@@ -146,7 +149,7 @@ def remove_unit(name: str) -> str:
     >>> [remove_unit(name) for name in ("t in ms", "Energy(J): ALLKE", "Energy (kinetic) [N mm]", "KE_kJ")]
     ['t', 'Energy: ALLKE', 'Energy (kinetic)', 'KE']
     """
-    name = _BRACKETS.sub(_drop_unit, name).strip()
+    name = re.sub(_BRACKETS, _drop_unit, name).strip()
     unit = find_unit(name)
     if unit and name.endswith(unit):
         name = name[: -len(unit)].rstrip(" /_,\t")

@@ -41,15 +41,16 @@ _OTHER_SUFFIXES: Final = (
     *(".csv", ".html", ".json", ".k", ".key", ".md", ".ndjson"),
     *(".pdf", ".png", ".py", ".rad", ".sh", ".svg", ".toml"),
 )
+# The patterns below are compiled on first use to keep start-up fast.
 # Beginning of an address on the network, such as https://.
-_ADDRESS: Final = re.compile(r"[a-z]+://", re.IGNORECASE)
+_ADDRESS: Final = r"(?i)[a-z]+://"
 # Suffixes of decks. A folder with decks but no databases belongs to a run that has not been computed yet.
 _DECKS: Final = (".k", ".key", ".dyn", ".rad")
 
 # Pattern of the name of a Radioss history, whose last two digits are the number of its restart segment.
-_RADIOSS_LEG: Final = re.compile(r"(.*T)(\d\d)(?:\.gz)?", re.DOTALL)
+_RADIOSS_LEG: Final = r"(?s)(.*T)(\d\d)(?:\.gz)?"
 # Pattern of a file name with or without the number of a restart segment (e.g. runT01, binout0001).
-_NUMBERED: Final = re.compile(r"(.*?)(\d*)(\.gz)?", re.DOTALL)
+_NUMBERED: Final = r"(?s)(.*?)(\d*)(\.gz)?"
 
 
 class Source(NamedTuple):
@@ -344,7 +345,7 @@ def _report_unread(name: str, error: OSError | ValueError) -> FormatError:
         return FormatError(
             f"{name}: this link leads to {target}, which does not exist; give the file itself, or correct the link"
         )
-    if isinstance(error, FileNotFoundError) and _ADDRESS.match(name):
+    if isinstance(error, FileNotFoundError) and re.match(_ADDRESS, name):
         return FormatError(
             f"{name}: an address on the network cannot be read; download the file, and give its name"
         )
@@ -421,7 +422,7 @@ def _unpack_pieces(
 
 def has_next_leg(name: str) -> bool:
     """Return True if the file is a T01, T02, ... of Radioss and the file with the next number is in its folder."""
-    match = _RADIOSS_LEG.fullmatch(name)
+    match = re.fullmatch(_RADIOSS_LEG, name)
     if match is None:
         return False
     successor = f"{match[1]}{int(match[2]) + 1:02d}"
@@ -441,7 +442,7 @@ def find_unread_legs(files: Sequence[str]) -> list[str]:
 
 def find_earlier_legs(files: Sequence[str]) -> list[str]:
     """Return the restart segments of a Radioss run that lie next to its ``files`` and precede the first of them."""
-    matches = [match for file in files if (match := _RADIOSS_LEG.fullmatch(file))]
+    matches = [match for file in files if (match := re.fullmatch(_RADIOSS_LEG, file))]
     if not matches:
         return []
     first = min(matches, key=lambda match: int(match[2]))
@@ -476,7 +477,7 @@ def find_later_legs(names: Sequence[str]) -> list[str]:
 
 def _split_leg_number(name: str) -> tuple[str, int]:
     """Split a file name into its stem and the number of its restart segment (0 if there is none)."""
-    match = _NUMBERED.fullmatch(name)
+    match = re.fullmatch(_NUMBERED, name)
     # The match is never None, because the pattern matches any text.
     assert match is not None
     return match[1], int(match[2] or 0)

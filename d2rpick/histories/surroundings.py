@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from math import inf
 from typing import TYPE_CHECKING
 
+from d2rpick.base.data_classes import dataclass
 from d2rpick.base.tuples import NamedTuple
 
 if TYPE_CHECKING:

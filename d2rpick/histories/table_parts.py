@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 # Name of the column with the energy of the chosen parts in a written table.
 CHOSEN_ENERGY: Final = "internal_energy"
-_COLUMN: Final = re.compile(r"not_chosen_(part|spring)_(\d{1,18})")
+_COLUMN: Final = r"not_chosen_(part|spring)_(\d{1,18})"
 
 
 def name_energy_of_part_not_chosen(part: Part, springs: Sequence[Part] = ()) -> str:
@@ -59,5 +59,5 @@ def _find_columns(database: Legs) -> tuple[re.Match[str], ...]:
     """Return the matched names of the columns for parts that were not chosen; empty for a solver file."""
     if READERS[database.format].solver:
         return ()
-    names = map(_COLUMN.fullmatch, database.channels)
+    names = [re.fullmatch(_COLUMN, name) for name in database.channels]
     return tuple(name for name in names if name)

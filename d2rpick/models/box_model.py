@@ -9,12 +9,12 @@ All quantities are in SI units.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from d2rpick.base.data_classes import dataclass
 from d2rpick.base.errors import RangeError
 
 Plane = NDArray[np.complex128]

@@ -9,11 +9,11 @@ has three equations of motion in the plane.
 from __future__ import annotations
 
 import copy
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
+from d2rpick.base.data_classes import dataclass
 from d2rpick.base.errors import RangeError
 from d2rpick.models.box_model import (
     GRAVITY,

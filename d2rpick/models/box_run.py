@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import pairwise
 from time import perf_counter
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
+from d2rpick.base.data_classes import dataclass
 from d2rpick.base.errors import RangeError
 from d2rpick.base.workers import choose_farm, count_cores
 from d2rpick.histories.history import EXACT, Given, History, Momenta, Track

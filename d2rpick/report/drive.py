@@ -28,7 +28,7 @@ _LEG: Final = row(
 DOCUMENT: Final = Document("d2rpick/drive/1", "Answer of d2rpick drive; times in the unit of the deck.", row(
     keys.WARNINGS,
     Field("windows", many(_WINDOW), "one entry for each flight, in the order of time"),
-    Field("legs", many(_LEG), "engine runs in the order of computation, including the discarded ones"),
+    Field("legs", many(_LEG), "engine runs in the order of computation, including the discarded engine runs"),
     Field("saved_by_model", "number?", "saved fraction of the CPU time of a deformable run, according to the cost "
           "model",
           lambda answer: answer.saved[0]),

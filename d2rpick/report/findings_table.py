@@ -75,18 +75,21 @@ _NOT_JUDGED: Final = "not judged by time"
 
 
 def as_table(checks: Checks, display: DisplayOptions) -> str:
-    """Return one line per finding and per window of each deck, the numbers of findings and decks, and the next step.
+    """Return the decision, one line per finding and per window of each deck, the next step, and the counts.
 
     Several decks begin with the decision and the next step, followed by the decks from the worst to the best; decks
-    without windows and findings are only listed. Below a plan with which the deck was written, the plan gives the next
-    step.
+    without windows and findings are only listed. Below a plan with which the deck was written, the plan gives the
+    decision and the next step.
     """
     if len(checks.results) > 1:
         return _format_many_decks(checks)
     lines = [line for result in checks.results for line in _format_deck(checks, result)]
-    step = [] if display.written_deck else [f"next  {_name_next_step(checks)}"]
+    decision, step = [], []
+    if checks.results and not display.written_deck:
+        decision = tables.format_in_line(_decide_on_deck(checks))
+        step = [f"next  {_name_next_step(checks)}"]
     return "\n".join(
-        [*map(make_printable, lines), "", *step, summarize_findings(checks)]
+        [*decision, *map(make_printable, lines), "", *step, summarize_findings(checks)]
     )
 
 
@@ -117,6 +120,32 @@ def _format_many_decks(checks: Checks) -> str:
             summarize_findings(checks),
         ]
     )
+
+
+def _decide_on_deck(checks: Checks) -> list[tuple[str, str]]:
+    """Return how many errors and warnings a single deck has, and whether a history is missing to judge its times.
+
+    If there are none but the times were judged, the verdicts below are the decision.
+    """
+    counts = count_severities(checks.results)
+    serious = [
+        f"{counts[f'{severity}s']} {noun}{'s' * (counts[f'{severity}s'] != 1)}"
+        for severity, noun in zip(Severity, _NOUNS, strict=True)
+        if severity is not Severity.INFO and counts[f"{severity}s"]
+    ]
+    missing = ""
+    if _lacks_history(checks):
+        missing = "; the times were not judged, because no history was given"
+    if serious:
+        return [("found", f"{' and '.join(serious)}{missing}")]
+    if checks.history is not None and any(result.windows for result in checks.results):
+        return []
+    return [("passed", f"no errors or warnings{missing}")]
+
+
+def _lacks_history(checks: Checks) -> bool:
+    """Return True if the decks have rigid windows but no history was given to judge them."""
+    return checks.history is None and any(result.windows for result in checks.results)
 
 
 def _list_decision(checks: Checks) -> list[tuple[str, str]]:
@@ -366,8 +395,8 @@ def summarize_findings(checks: Checks) -> str:
     ]
     decks = "1 deck" if len(results) == 1 else f"{len(results)} decks"
     left_out = f", {len(checks.failed)} not checked" if checks.failed else ""
-    unjudged = checks.history is None and any(result.windows for result in results)
-    return f"{', '.join(counted)} in {decks}{left_out}{'; times not judged: no `history`' * unjudged}"
+    unjudged = "; times not judged: no `history`" * _lacks_history(checks)
+    return f"{', '.join(counted)} in {decks}{left_out}{unjudged}"
 
 
 def format_path(path: str, root: str) -> str:

@@ -120,8 +120,8 @@ _POSITION: Final = (
     Field("position_error_assumes", "text?",
           "assumption about the rigid bodies, because there is no deck; null with a deck"),
     Field("position_error_is_lower_bound", "flag?",
-          "true if the position error may be larger, because an internal motion with a period longer than the flight, "
-          "or bending of the body, looks like a rotation; null if unknown", later=True),
+          "true if the position error may be larger; null if unknown. The cause is an internal motion with a period "
+          "longer than the flight, or bending of the body; both look like a rotation", later=True),
 )  # fmt: skip
 # All values of a candidate. New values are added at the end, so that the CSV columns keep their order.
 CANDIDATE: Final = row(
@@ -134,9 +134,9 @@ CANDIDATE: Final = row(
     Field(
         "kind",
         KIND,
-        "how tr was found: crossing (the energy crosses its level at td), extremum (extremum of the energy near this "
-        "level), match (the deformations of several modes are similar to their deformations at td), or start (start "
-        "of a flight in which nothing vibrates)",
+        "how tr was found. crossing: the energy crosses its level at td. extremum: the energy has an extremum near "
+        "this level. match: the deformations of several modes are similar to their deformations at td. start: a "
+        "flight in which nothing vibrates starts",
     ),
     Field("energy", "number", "internal energy at tr"),
     Field("level_ratio", "number?", "E(tr)/E(td)"),

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import os
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import COPY_AGAIN, list_names
 from d2rpick.base.options import make_option_name
+from d2rpick.base.tuples import NamedTuple
 from d2rpick.choice.options import list_uses
 from d2rpick.choice.pair.grades import DO_NOT_USE
 from d2rpick.deck.beside import SOME_NODES, SOME_PARTS, find_deck_beside
@@ -344,7 +345,11 @@ def name_step_after_flight(
 def name_step_without_flight(history: History, question: RepeatedQuestion) -> str:
     """Return the step if no flight is found; the end of the load is asked for unless the momentum shows no flight."""
     # Imported here, because a card without a history needs no numpy.
-    from d2rpick.flight.flight import NEVER_FLIES, denies_every_flight
+    from d2rpick.flight.flight import (
+        NEVER_FLIES,
+        denies_every_flight,
+        describe_hiding_digits,
+    )
     from d2rpick.histories.samples import find_holes
 
     more = ask_for_states_that_show_flight(
@@ -365,6 +370,8 @@ def name_step_without_flight(history: History, question: RepeatedQuestion) -> st
     if not denies_every_flight(history):
         return f"{more}{look}, or give the end of the load as --after"
     no_pair = f"{more}{name_lack_of_pairs(question)}: {NEVER_FLIES}"
+    if hint := describe_hiding_digits(history):
+        return f"{no_pair}; {hint}, or run it without switching"
     if any(momenta.parts for momenta in history.momenta):
         return f"{no_pair}; run it without switching"
     return f"{no_pair}; to find out whether single parts fly, {look}"
@@ -538,7 +545,7 @@ def name_step_after_card(
         action = f"these times were not judged, because no history was given; {action}"
     files = make_positional([main_deck.name])
     line = quote_shell_line(("d2rpick", "check", *question.checking, *files))
-    if is_separate and not main_deck.hint:
+    if is_separate and not deck and not main_deck.hint:
         again = f"print the card again with --deck {main_deck.name}"
         action = f"if these parts share nodes, {again}, which merges them; {action}"
     elif is_separate:

@@ -19,6 +19,7 @@ from d2rpick.report import (
     verdict,
 )
 from d2rpick.report.decision import (
+    format_accuracy,
     format_rigid_time,
     list_statements,
     list_verdict_lines,
@@ -99,6 +100,7 @@ _LOOKS: Final[
         lambda answer: [
             ("", plan.give_plan_sentence(answer)),
             *plan.list_verdicts(answer),
+            *plan.list_accuracies(answer),
             *plan.list_plan_remarks(answer),
         ],
         plan.build_flight_table,
@@ -466,6 +468,8 @@ def _build_window_card(row: PlannedFlight, answer: RunPlan) -> Markup:
         ("rigid for", format_rigid_time(row.candidate, answer.history)),
         *list_statements(row.decision),
     ]
+    if accuracy := format_accuracy(row.candidate):
+        facts.append(("tr", accuracy))
     title = f"Flight {row.number}: "
     return page.build_verdict_card(
         title, row.decision, row.window, answer.history, facts

@@ -10,6 +10,7 @@ from d2rpick.choice.pair.grades import DO_NOT_USE, GOOD, USE, USE_WITH_CARE
 from d2rpick.choice.td.plan import TOO_SHORT
 from d2rpick.report import keys, tables
 from d2rpick.report.decision import (
+    format_accuracy,
     format_in_full,
     format_outlook,
     format_rigid_share,
@@ -201,6 +202,10 @@ WINDOW: Final = row(
     ),
     _BEST.field("position_error_is_lower_bound"),
     *keys.DECISION,
+    *(
+        _BEST.field(key)._replace(kind="number?", later=True)
+        for key in ("timing_tolerance", "tr_low", "tr_high")
+    ),
     closed=True,
 )
 DOCUMENT: Final = Document(
@@ -569,12 +574,22 @@ def list_flight_remarks(
     """
     remarks = [
         *_list_outlooks(plan),
+        *list_accuracies(plan),
         *list_plan_remarks(plan),
         *list_reasons(plan),
         *further,
     ]
     numbers = {f"flight {row.number}": row.number for row in plan.flights}
     return sorted(remarks, key=lambda remark: numbers.get(remark[0], len(numbers) + 1))
+
+
+def list_accuracies(plan: RunPlan) -> list[tuple[str, str]]:
+    """Return how exactly tr is known and has to be met, for each window of the next run, as (flight, text) pairs."""
+    return [
+        (f"flight {row.number}", f"tr = {row.candidate.tr:.6g}: {accuracy}")
+        for row in plan.supported
+        if row.candidate and (accuracy := format_accuracy(row.candidate))
+    ]
 
 
 def list_reasons(plan: RunPlan) -> list[tuple[str, str]]:

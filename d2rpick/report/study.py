@@ -111,9 +111,9 @@ _SHARED: Final = row(
           lambda answer: answer.spread or dict.fromkeys(_EXTENTS)),
     Field("agree", "flag?", "true if the intervals from tr_low to tr_high of these runs overlap"),
     Field("common_tr", "number?",
-          "if the runs agree, the median of tr, or the nearest time that lies in all intervals; otherwise the "
-          "earliest tr that is admissible in every run with status ok or none, and within the timing tolerance of "
-          "each of them; null if there is none", lambda answer: answer.common.tr),
+          "tr for all runs; null if there is none. If the runs agree: the median of tr, or the nearest time that lies "
+          "in all intervals. Otherwise: the earliest tr that is admissible in every run with status ok or none, and "
+          "within the timing tolerance of each of these runs", lambda answer: answer.common.tr),
     Field("common_verdict", maybe(keys.VERDICT),
           "what to do with common_tr: the verdict for the worst run, from its own pair and from its error at "
           "common_tr",

@@ -23,10 +23,12 @@ _LEAST: Final = 12
 # Pattern of a word that cmd and PowerShell pass on unchanged without quotes.
 _PLAIN_ON_WINDOWS: Final = r"[\w./\\:=+-]+"
 # _NUMBER: pattern of a number, which is not treated as a spreadsheet formula.
-# _FORMULA: pattern of a spreadsheet formula, which begins with =, +, -, @ or the full-width form of one of these.
+# _SIGNS: =, +, -, @ and their full-width, small, raised and lowered forms, which normalisation turns into these signs.
+# _FORMULA: pattern of a spreadsheet formula, which begins with one of these signs.
 # A formula may follow a semicolon, because some spreadsheets use it to separate the cells of a CSV file.
 _NUMBER: Final = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
-_FORMULA: Final = rf"(?:^|;)\s*(?=[=+\-@＝＋－＠])(?!{_NUMBER}\s*(?:;|$))"
+_SIGNS: Final = r"=+\-@＝＋－＠﹦﹢﹣﹫⁼⁺₌₊⩵⩶﬩"
+_FORMULA: Final = rf"(?:^|;)\s*(?=[{_SIGNS}])(?!{_NUMBER}\s*(?:;|$))"
 # Largest number of characters in a cell that is not wrapped; longer cells are wrapped before columns are omitted.
 _TEXT: Final = 20
 

@@ -302,7 +302,8 @@ DOCUMENT: Final = Document("d2rpick/explore/2", "Answer of d2rpick explore; time
     *keys.FRAME,
     Field("td", "number?", "given td", lambda trade_off: trade_off.requested and trade_off.requested.td),
     Field("td_window", "span",
-          "range in which td was explored: the given range, or the longest flight up to the margin before the contact"),
+          "range in which td was explored: the given range or, up to the margin before the contact, the flight that "
+          "contains td, else the longest flight"),
     *keys.MECHANICS.of_part(lambda trade_off: trade_off.situation, ("flight", "oscillator", "modes")),
     Field("answer", "text", "summary of the answer in one sentence", give_answer),
     Field("recommended", maybe(keys.TIMES), "recommended pair; null if there is none"),

@@ -44,9 +44,10 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "Give the deck with --deck, or write the mass, or the kinetic and internal energy.",
         ),
         "landing-not-shown": Explanation(
-            "The record shows that the parts fly on after the landing that you gave. What happens there is not in the "
-            "record: an airbag that fires, or a contact of another variant. d2rpick does not know its energy, so it "
-            "grades the vibration after td by its error alone, as with --keep-vibration.",
+            "The record shows that the parts fly on after the landing that you gave. The event at this time, such as "
+            "an airbag that fires or a contact of another variant, is not in the record. The energy of this event is "
+            "unknown, so d2rpick grades the vibration after td by the vibration error alone, as with "
+            "--keep-vibration.",
             "Nothing to do for such an event. For a contact of this run, give the time at which the force begins, or "
             "omit --landing.",
         ),
@@ -75,8 +76,8 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "deck, d2rpick assumes the worst rotation that the kinetic energy allows, so the margin before the next "
             "contact may be large. Without the deck, the margin may be too short.",
             "Give the deck with --deck, and write the motion of at least three nodes of the body that do not lie on "
-            "a line: /TH/NODE of Radioss, *DATABASE_HISTORY_NODE of LS-DYNA with the binout or nodout. Otherwise set "
-            "the margin with --margin.",
+            "a line. In Radioss use /TH/NODE, in LS-DYNA use *DATABASE_HISTORY_NODE with the binout or nodout. "
+            "Otherwise set the margin with --margin.",
         ),
         "td-after-contact": Explanation(
             "The next contact begins before td, or td lies within the margin before it. The parts may hit something "
@@ -179,8 +180,9 @@ EXPLANATIONS_BY_TOPIC: Final = {
     },
     "Health of the run": {
         "begins-late": Explanation(
-            "The record begins after the start of the run, and earlier restart segments lie in the same folder. They "
-            "show whether the run was switched, and when the load ended. d2rpick does not use the rest alone.",
+            "The record begins after the start of the run, and earlier restart segments lie in the same folder. The "
+            "earlier segments show whether the run was switched, and when the load ended. d2rpick does not use the "
+            "later segments alone.",
             "Name the earlier restart segments too.",
         ),
         "blew-up": Explanation(
@@ -278,9 +280,9 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "Nothing to do if it is the deck of this run. Otherwise give another deck with --deck, or use --no-deck.",
         ),
         "deck-not-followed": Explanation(
-            "Either d2rpick cannot evaluate an item of the deck, such as a curve or a sensor, and uses the history "
-            "instead; or the deck already contains switching cards, which the answer does not consider. The warning "
-            "names the line.",
+            "d2rpick cannot evaluate an item of the deck, such as a curve or a sensor, and uses the history instead. "
+            "The warning is also issued if the deck already contains switching cards, which the answer does not "
+            "consider. The warning names the line.",
             "Check the named line. If it is a load, give its end with --after.",
         ),
         "deck-of-another-model": Explanation(
@@ -339,8 +341,9 @@ EXPLANATIONS_BY_TOPIC: Final = {
         ),
         "parts-not-joined": Explanation(
             "The card makes several parts rigid, each as a separate rigid body. If they share nodes, they must form "
-            "one rigid body.",
-            "Give the deck with --deck, or merge the parts with --merge.",
+            "one rigid body. Without a deck, or if elements of the deck are encrypted or missing, it is unknown "
+            "whether they share nodes.",
+            "Give the deck with all its includes (--deck), or merge the parts with --merge.",
         ),
         "same-leg-twice": Explanation(
             "calibrate found the same restart segment or engine run twice. It uses this run once.",
@@ -405,8 +408,9 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "To plan the longer window first, set --min-rigid to a value between the two lengths.",
         ),
         "rigid-times": Explanation(
-            "This record is that of a switched run: parts were rigid in the stated interval, which d2rpick does not "
-            "use as a flight of a reference run. What the window froze also changes the vibration after it.",
+            "A switched run wrote this record: parts were rigid in the stated interval. d2rpick does not use this "
+            "interval as a flight. The deformation that was frozen in this interval also changes the vibration after "
+            "it.",
             "Choose times from the reference run. To plan the later windows of the switched run, use d2rpick plan "
             "--done.",
         ),
@@ -441,8 +445,8 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "Name the same parts for all runs by their numbers with --part.",
         ),
         "mixed-units": Explanation(
-            "The runs have different time units, by their files or because the times of some are 1000 times those of "
-            "others. A study has one unit for td and tr.",
+            "The runs have different time units: their files name different units, or the times of some runs are 1000 "
+            "times the times of other runs. A study has one unit for td and tr.",
             "Convert the runs to one unit, or study the runs of each unit separately.",
         ),
         "runs-left-out": Explanation(

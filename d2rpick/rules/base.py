@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from enum import StrEnum
 from itertools import pairwise
 from typing import TYPE_CHECKING, TypeVar
 
 from d2rpick.base.caching import cached_property
+from d2rpick.base.data_classes import dataclass
 from d2rpick.base.errors import FORESEEN, INTERNAL_ERROR, format_in_one_line
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.deck.card import CardField

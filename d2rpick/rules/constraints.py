@@ -10,10 +10,11 @@ LRB; the vendor's public modelling rules for rigid bodies, which permit joints b
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import choose_verb, name_units
 from d2rpick.base.graph import find_reachable
+from d2rpick.base.tuples import NamedTuple
 from d2rpick.deck.ls_dyna_parts import DELETING_FLAGS, read_merged_bodies
 from d2rpick.rules.base import ERROR, WARNING, Case, PlacedMessage, group_values
 from d2rpick.rules.example import Example, make_deck, write_automatic_card
@@ -430,7 +431,7 @@ def _check_separated_joints(case: Case) -> Iterator[PlacedMessage]:
 @make_rule_decorator("D2R122", WARNING, "a switched part on *CONSTRAINED_RIGID_BODIES")
 def _check_merged_bodies(case: Case) -> Iterator[PlacedMessage]:
     """*CONSTRAINED_RIGID_BODIES merges rigid bodies whose parts have *MAT_RIGID. A part that a card makes rigid has a
-    deformable material, so the keyword does not apply to it, and the parts become separate rigid bodies unless the card
+    deformable material, so the keyword does not apply to it. The parts become separate rigid bodies unless the card
     merges them. Source: the vendor's public help on the command that writes this keyword. Not tested with the solver.
 
     Fix: Remove the part from *CONSTRAINED_RIGID_BODIES, and merge the parts with LRB on the card.

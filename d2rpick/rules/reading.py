@@ -92,8 +92,8 @@ def _make_elements(keyword: str) -> Example:
 )
 def _check_counts(case: Case) -> Iterator[PlacedMessage]:
     """The second line of *DEFORMABLE_TO_RIGID_AUTOMATIC gives the number of D2R lines (D2R) and of R2D lines (R2D) that
-    follow it, one line per part. If a count is wrong or a line is missing, the solver reads a part from the wrong line,
-    or reads a part line as the next card. If both counts are 0, the card switches no part.
+    follow it, one line per part. If a count is wrong or a line is missing, the solver misreads the lines: it reads a
+    part from the wrong line, or treats a part line as the next card. If both counts are 0, the card switches no part.
 
     Fix: Write one line per part, and set D2R and R2D to the number of these lines.
     """
@@ -137,8 +137,8 @@ def _check_counts(case: Case) -> Iterator[PlacedMessage]:
     BOTH,
 )
 def _check_fields(case: Case) -> Iterator[PlacedMessage]:
-    """Fields are 10 columns wide (20 in long format), unless the line is separated by commas. If the columns of a
-    number contain text, or a parameter is undefined, the run stops, or the solver reads another value. If a switching
+    """Fields are 10 columns wide (20 in long format), unless commas separate the fields of the line. If the columns of
+    a number contain text, or a parameter is undefined, the run stops, or the solver reads another value. If a switching
     keyword is misspelled, the solver ignores the card. d2rpick also checks ENDTIM and the DT of *DATABASE_GLSTAT and
     *DATABASE_MATSUM, because it compares the switching times with them.
 
@@ -238,7 +238,8 @@ def _check_includes(case: Case) -> Iterator[PlacedMessage]:
 )
 def _check_parameters(case: Case) -> Iterator[PlacedMessage]:
     """By default LS-DYNA warns and keeps the first definition. *PARAMETER_DUPLICATION and *PARAMETER_MUTABLE change
-    that, and other programs that read decks keep the last definition. A switching time must not depend on this choice.
+    this behaviour, and other programs that read decks keep the last definition. A switching time must not depend on
+    this choice.
 
     Fix: Keep one definition of the parameter.
     """
@@ -378,10 +379,10 @@ def _report_untimed(case: Case) -> Iterator[PlacedMessage]:
     the deck has only one contact or wall. d2rpick evaluates a *SENSOR_CONTROL if its *SENSOR_SWITCH depends on the
     time, or on the magnitude of a contact or wall force. It assumes that the parts are rigid while the sensor is on,
     and deformable while it is off; this was not tested with the solver. If you check restarts together with their main
-    deck, they have times: each restart begins at the ENDTIM of the previous run.
+    deck, their switches have times: each restart begins at the ENDTIM of the previous run.
 
-    Fix: To have the switches judged, give a history with contact forces or part momenta (--history), check restarts
-    together with their main deck, or switch by time (CODE 0).
+    Fix: To judge the switches, give a history with contact forces or part momenta (--history). Check restarts together
+    with their main deck, or switch by time (CODE 0).
     """
     for field, how in case.untimed:
         yield field, f"{how}; not judged by time"

@@ -334,13 +334,14 @@ def _check_on_again(case: RunCase) -> Iterator[PlacedMessage]:
 @make_rule_decorator(
     "D2R404",
     WARNING,
-    "no limit of the time step, or a large one, while parts are rigid",
+    "no limit on the time step, or a large limit, while parts are rigid",
     (RADIOSS,),
 )
 def _check_step_limit(case: RunCase) -> Iterator[PlacedMessage]:
-    """If nothing deformable is left, the time step grows by 10 % per cycle without limit, and the release at td occurs
-    late. /DTIX limits the time step. This rule also reports a limit above 1 % of the rigid window. It reports a missing
-    limit only if every element lies in a rigid part. Source: runs computed with OpenRadioss (td was 0.26 ms late).
+    """If nothing deformable is left, the time step grows by 10 % per cycle without limit. The release at td then occurs
+    late. The keyword /DTIX limits the time step. This rule also reports a limit above 1 % of the rigid window. It
+    reports a missing limit only if every element lies in a rigid part. Source: runs computed with OpenRadioss (td was
+    0.26 ms late).
 
     Fix: Add /DTIX to the engine file, with a largest time step below 1 % of the rigid window.
     """
@@ -548,9 +549,9 @@ def _report_missing_starter(case: RunCase) -> Iterator[PlacedMessage]:
     (RADIOSS,),
 )
 def _check_walls(case: RunCase) -> Iterator[PlacedMessage]:
-    """The starter removes the nodes of every /RBODY with Ikrem 0 from all /RWALL, even if the engine deactivates the
-    body in the first engine file (warning 446). These nodes can pass through the wall. OpenRadioss applies the Ikrem of
-    the /RBODY with the highest id to all bodies. With Ikrem 1 the wall acts on the nodes while the body is off, but not
+    """The starter removes the nodes of every /RBODY with Ikrem 0 from all /RWALL (warning 446). It does so even if the
+    first engine file deactivates the body. These nodes can pass through the wall. OpenRadioss applies the Ikrem of the
+    /RBODY with the highest id to all bodies. With Ikrem 1 the wall acts on the nodes while the body is off, but not
     while it is on. Walls with the penalty formulation (Iform 1, since 2026) keep their nodes. Source: Altair's help for
     /RBODY and /RWALL, the published source of OpenRadioss, and runs computed with it (a car that went through a pole).
 
@@ -582,11 +583,11 @@ def _check_walls(case: RunCase) -> Iterator[PlacedMessage]:
     (RADIOSS,),
 )
 def _check_velocities(case: RunCase) -> Iterator[PlacedMessage]:
-    """The starter gives all nodes of an /RBODY the velocity of its main node, even if the engine deactivates the body
-    in the first engine file. If the node group of /INIVEL lacks the main node, the body begins at rest, and the solver
-    issues no message. An /INIV in an engine file moves an active body by its main node alone, and an inactive body by
-    its nodes. The rule does not evaluate velocities that begin later (tstart, a sensor). Source: runs computed with
-    OpenRadioss.
+    """The starter gives all nodes of an /RBODY the velocity of its main node, even if the first engine file deactivates
+    the body. If the node group of /INIVEL lacks the main node, the body begins at rest, and the solver issues no
+    message. An /INIV in an engine file acts on an active body through its main node alone, and on an inactive body
+    through all its nodes. The rule does not evaluate velocities that begin later (tstart, a sensor). Source: runs
+    computed with OpenRadioss.
 
     Fix: Add the main node to the node group of the initial velocity.
     """
@@ -618,7 +619,7 @@ def _make_sensed_run(*lines: str) -> Example:
     (RADIOSS,),
 )
 def _check_sensor_stop(case: RunCase) -> Iterator[PlacedMessage]:
-    """Tstop has a line of its own below Tdelay. Radioss does not read a number after Tdelay on the same line, so the
+    """Tstop has a line of its own below Tdelay. Radioss does not read a number after Tdelay on the same line. So the
     sensor stays active to the end, and the body that it switches stays deformable. Source: the format files of
     OpenRadioss, and runs computed with it.
 

@@ -109,12 +109,12 @@ def _check_unique_ids(case: Case) -> Iterator[PlacedMessage]:
 )
 def _check_pairs(case: Case) -> Iterator[PlacedMessage]:
     """Paired sets act in turn as a contact or wall force begins and ends. Each set names the other in RELSW. PAIRED is
-    1 for the set that acts first and -1 for the other. Their CODEs are 1 and 3 (rigid wall) or 2 and 4 (contact). Sets
-    with CODE 3 or 4 on the D2R side and 1 or 2 on the R2D side, paired or not, are the wrong way round: the parts are
-    rigid during the impact and deformable in flight. Source: vendor keyword data for the codes. For a long time, a
-    public drop tool wrote decks in which CODE 2 and 4 were interchanged.
+    1 for the set that acts first and -1 for the other. Their CODEs are 1 and 3 (rigid wall) or 2 and 4 (contact). CODE
+    3 or 4 on the D2R side, or CODE 1 or 2 on the R2D side, is wrong for every set, paired or not: the parts are rigid
+    during the impact and deformable in flight. Source: vendor keyword data for the codes. For a long time, a public
+    drop tool wrote decks in which CODE 2 and 4 were interchanged.
 
-    Fix: Let RELSW of each set name the other, set PAIRED to 1 and -1, and use CODE 1 or 2 to make parts rigid and CODE
+    Fix: Let RELSW of each set name the other, and set PAIRED to 1 and -1. Use CODE 1 or 2 to make parts rigid, and CODE
     3 or 4 to make them deformable.
     """
     by_id = {header.swset.value: header for _, header in reversed(case.headers)}

@@ -301,8 +301,8 @@ def _find_absent(line: Switched, parts: DeckParts) -> Iterator[tuple[str, int]]:
 def _check_always_rigid(case: Case) -> Iterator[PlacedMessage]:
     """A part with *MAT_RIGID is rigid from the start and cannot become deformable.
 
-    Fix: Leave the part out of the switched parts. If it is meant to deform, give it its deformable material, and make
-    it rigid with a D2R line.
+    Fix: Leave the part out of the switched parts. If the part is meant to deform, give it a deformable material, and
+    make it rigid with a D2R line.
     """
     back_events = [
         event
@@ -524,8 +524,8 @@ def _check_flowing_material(case: Case) -> Iterator[PlacedMessage]:
     "D2R119", WARNING, "a switched part whose law keeps a stress-free reference", BOTH
 )
 def _check_reference_laws(case: Case) -> Iterator[PlacedMessage]:
-    """Hyperelastic and total Lagrangian laws compute the stress from the deformation since the start, not from the
-    stress at the time at which the part was made rigid. After the switch back the part may have a stress that it did
+    """Hyperelastic and total Lagrangian laws compute the stress from the deformation since the start. They do not use
+    the stress that the part had when it was made rigid. After the switch back the part may have a stress that it did
     not have before. In Radioss, the rule applies to hyperelastic laws and to solids with Ismstr 10 to 12. Source: the
     theory of the laws, and a report of 2026 on a hyperelastic solid in LS-DYNA R14. Not tested with the solver.
 

@@ -345,8 +345,8 @@ def _find_mixed_units(times: list[float], end: float, run_end: str) -> str | Non
     "the switching times are about 1000 times the termination time, or 1/1000 of it",
 )
 def _check_units_of_deck(case: Case) -> Iterator[PlacedMessage]:
-    """The deck seems to mix seconds and milliseconds: the switching times lie outside the run or in its first 1/1000,
-    but would lie in the run if they were divided or multiplied by 1000. Files contain no unit names, so d2rpick infers
+    """The deck seems to mix seconds and milliseconds. The switching times lie outside the run or in its first 1/1000,
+    but would lie in the run after division or multiplication by 1000. Files contain no unit names, so d2rpick infers
     this from the magnitudes. D2R101 does not report these times again.
 
     Fix: Write the switching times and ENDTIM in the same time unit.
@@ -475,9 +475,9 @@ def _check_times_of_history(case: Case) -> Iterator[PlacedMessage]:
 )
 def _check_locked_in_error(case: Case) -> Iterator[PlacedMessage]:
     """While a part is rigid, it keeps the deformation that it had at tr, and it springs back at td. This deformation
-    should equal the deformation in the reference run at td: same energy, same direction. d2rpick judges the parts that
-    share a window together, as d2rpick verify does, or the whole model if the history has no parts. It uses the
-    frozen-deformation error if a vibration model describes the history, otherwise the level error.
+    should equal the deformation in the reference run at td: same energy, same direction. d2rpick judges all parts with
+    the same window together, as d2rpick verify does. If the history has no parts, it judges the whole model. It uses
+    the frozen-deformation error if a vibration model describes the history, otherwise the level error.
 
     Fix: Replace tr, or both times, by the times in the finding, or by the times that d2rpick suggest gives.
     """
@@ -537,7 +537,7 @@ def _check_quality(case: Case) -> Iterator[PlacedMessage]:
 @set_passing(lambda: [_make_good_pair()])
 @set_failing(lambda: [_make_pair_deck(".0128853", "0.064", "--max-residual 0.5")])
 @make_rule_decorator(
-    "D2R210", ERROR, "a pair beyond a limit, such as --max-residual", BOTH
+    "D2R210", ERROR, "a pair that exceeds a limit, such as --max-residual", BOTH
 )
 def _check_limits(case: Case) -> Iterator[PlacedMessage]:
     """The pair exceeds a limit that an option sets, such as --max-residual or --max-kinetic-share, or the history does
@@ -557,7 +557,8 @@ def _check_flight(case: Case) -> Iterator[PlacedMessage]:
     """If tr lies before the end of the load, an equal energy is a coincidence, and the motion of the body is wrong. If
     td lies after the next contact, a rigid part does not deform in this contact. d2rpick finds the start and end of the
     flight from the momentum or the energy in the history, or uses the time of --after. It also reports a history that
-    does not show the flight, and a part that a support or a prescribed motion of the deck keeps from flying.
+    does not show the flight. It also reports a part that cannot fly because of a support or a prescribed motion in the
+    deck.
 
     Fix: Move tr after the load and td before the next contact. If the history does not show when the load ends, give
     --after.
@@ -571,9 +572,9 @@ def _check_flight(case: Case) -> Iterator[PlacedMessage]:
     "D2R205", ERROR, "time or part that the history does not contain", BOTH
 )
 def _check_in_history(case: Case) -> Iterator[PlacedMessage]:
-    """The history gives no energy at times outside its record, and none for a part that it does not contain. d2rpick
-    also reports a td within the first ten states if 1000 times this td lies in the history, because this td seems to
-    have another unit.
+    """The history gives no energy at times outside its record, and no energy of a part that it does not contain. A td
+    within the first ten states seems to have another unit if 1000 times this td lies in the history. d2rpick reports
+    such a td too.
 
     Fix: Correct the time or the part id, or extend the reference run.
     """

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import json
 import time
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from d2rpick.base.data_classes import dataclass
 from d2rpick.base.errors import D2RPickError
 from d2rpick.base.files import (
     add_checksum,

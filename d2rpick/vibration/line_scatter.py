@@ -6,12 +6,12 @@ covariance of their weights and poles, and the gradient of R^2 by these gives th
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from d2rpick.base.caching import cached_property
+from d2rpick.base.data_classes import dataclass
 
 if TYPE_CHECKING:
     from d2rpick.histories.history import Samples

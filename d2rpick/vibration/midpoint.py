@@ -17,12 +17,12 @@ line of height h/2 at twice its frequency and twice its decay rate (docs/explana
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from d2rpick.base.caching import cached_property
+from d2rpick.base.data_classes import dataclass
 from d2rpick.base.tuples import NamedTuple
 
 if TYPE_CHECKING:

@@ -8,12 +8,13 @@ in free flight, the doubts give the reason.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, ClassVar, Final
 
 import numpy as np
 
 from d2rpick.base.caching import cached_property
+from d2rpick.base.data_classes import dataclass
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.vibration import measures
 from d2rpick.vibration.close_modes import find_close_modes

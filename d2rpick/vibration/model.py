@@ -7,13 +7,14 @@ deformations that can be compared with those at td, if any are known.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final, cast
 
 import numpy as np
 
 from d2rpick.base.caching import cached_property
+from d2rpick.base.data_classes import dataclass
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.vibration import MODELS, measures
 from d2rpick.vibration.amplitudes import SignedAmplitudes

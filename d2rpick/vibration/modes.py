@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from d2rpick.base.data_classes import dataclass
 from d2rpick.histories.samples import narrow_brackets
 from d2rpick.vibration.amplitudes import SignedAmplitudes
 

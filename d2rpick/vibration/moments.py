@@ -6,7 +6,6 @@ the deformations match best. The energy around a td is known from its samples or
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import pairwise
 from math import sqrt
 from typing import TYPE_CHECKING, Final
@@ -14,6 +13,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.base.caching import cached_property
+from d2rpick.base.data_classes import dataclass
 from d2rpick.histories.samples import find_crossings, find_turns
 from d2rpick.vibration import measures
 

@@ -13,12 +13,12 @@ td, and after td.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import sqrt
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
 
+from d2rpick.base.data_classes import dataclass
 from d2rpick.base.errors import RangeError
 from d2rpick.histories.history import LARGEST_ENERGY
 from d2rpick.vibration.modes import Mode

@@ -8,12 +8,12 @@ times, and half cycles cannot be counted.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Final, NamedTuple
 
 import numpy as np
 
 from d2rpick.base.caching import cached_property
+from d2rpick.base.data_classes import dataclass
 from d2rpick.histories.samples import find_turns
 from d2rpick.vibration.amplitudes import SignedAmplitudes
 from d2rpick.vibration.measures import Profile, vertices, wrong_sign

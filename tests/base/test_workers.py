@@ -5,10 +5,9 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from pathlib import Path
 from subprocess import PIPE, Popen, check_output
-from threading import Condition, get_ident, main_thread
 
 import pytest
 
@@ -102,17 +101,22 @@ def test_any_process_may_be_killed_without_a_loss(victim: str, after: int) -> No
         "print(done)\n"
     )
     with Popen(
-        [sys.executable, "-c", code], cwd=ROOT, stdin=PIPE, stdout=PIPE, text=True
+        [sys.executable, "-c", code],
+        cwd=ROOT,
+        stdin=PIPE,
+        stdout=PIPE,
+        stderr=PIPE,
+        text=True,
     ) as process:
         assert process.stdout
         assert process.stdout.readline() == "\n"
         os.kill(children_of(process.pid)[victim][0], signal.SIGKILL)
-        assert process.communicate("\n", timeout=TIME_LIMIT)[0] == "11\n"
+        assert process.communicate("\n", timeout=TIME_LIMIT) == ("11\n", "")
     assert process.returncode == 0
 
 
 def test_a_program_that_is_killed_leaves_no_message_of_its_pool() -> None:
-    """Whoever kills the program, the tracker of its semaphores deletes them without a warning."""
+    """The processes of the pool end silently, whoever kills the program."""
     code = (
         "import os, signal\n"
         "from d2rpick.base.workers import Cores\n"
@@ -130,17 +134,13 @@ def test_a_program_that_is_killed_leaves_no_message_of_its_pool() -> None:
 
 
 def test_a_worker_that_starts_too_late_ends_without_a_traceback() -> None:
-    """The end of the program deletes the semaphores that a worker needs, which may still be starting."""
+    """The program may end before it has sent what a worker needs to start."""
     code = (
-        "import d2rpick.base.interruptible\n"
-        "from multiprocessing import get_context\n"
-        "from multiprocessing.context import set_spawning_popen\n"
-        "from types import SimpleNamespace\n"
-        "lock = get_context('spawn').Lock()\n"
-        "set_spawning_popen(SimpleNamespace(duplicate_for_child=int))\n"
-        "state = lock.__getstate__()\n"
-        "set_spawning_popen(None)\n"
-        "lock.__setstate__((*state[:3], '/deleted', *state[4:]))\n"
+        "import d2rpick.base.interruptible, os\n"
+        "from multiprocessing.spawn import _main\n"
+        "end, start = os.pipe()\n"
+        "os.close(start)\n"
+        "_main(end, end)\n"
     )
     process = subprocess.run(
         [sys.executable, "-c", code],
@@ -168,72 +168,55 @@ def test_items_are_taken_as_there_is_room(farm: Callable[[], Farm]) -> None:
             assert taken <= done + getattr(workers, "room", 1)
 
 
-def test_an_interrupt_does_not_wait_for_a_lock_of_the_pool() -> None:
-    code = (
-        "import os\n"
-        "from d2rpick.base.workers import Cores\n"
-        "try:\n"
-        "    with Cores(2, 'tests.base.test_workers') as farm:\n"
-        "        farm._pool._shutdown_lock.acquire()\n"
-        "        raise KeyboardInterrupt\n"
-        "except KeyboardInterrupt:\n"
-        "    print('interrupted', flush=True)\n"
-        "    os._exit(0)\n"
-    )
-    with Popen(
-        [sys.executable, "-c", code], cwd=ROOT, stdout=PIPE, text=True
-    ) as process:
-        try:
-            output, _ = process.communicate(timeout=30)
-        finally:
-            process.kill()
-    assert output == "interrupted\n"
+class UnsendableError(Exception):
+    """An error that can be packed, but not unpacked."""
+
+    def __init__(self, place: int, reason: str) -> None:
+        super().__init__(f"{reason} at {place}")
 
 
-def test_the_main_thread_holds_no_lock_of_the_pool(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """An interrupt in the main thread would leave such a lock locked, and the program could never end."""
-    entered: list[bool] = []
-    enter = Condition.__enter__
+def answer_oddly(number: int) -> object:
+    """Return or raise something that cannot be sent to another process, or more than a pipe holds."""
+    if number == 0:
+        return lambda: None
+    if number == 1:
+        raise UnsendableError(7, "odd")
+    return bytes(10**6)
 
-    def count_entries(condition: Condition) -> bool:
-        entered.append(get_ident() == main_thread().ident)
-        return enter(condition)
 
+def test_an_answer_that_cannot_be_sent_is_an_error_of_its_item_alone() -> None:
     with Cores(2, __name__) as workers:
-        answers = workers.answers(square, [0, 1, 99, *range(2, 12)])
-        next(answers)  # the thread that uses the pool has been started
-        monkeypatch.setattr(Condition, "__enter__", count_entries)
-        assert len(list(answers)) == 12
-    assert entered
-    assert not any(entered)
+        answers = {
+            answer.number: answer for answer in workers.answers(answer_oddly, range(6))
+        }
+    assert sorted(answers) == [*range(6)]
+    assert all("cannot be sent" in str(answers[number].error) for number in (0, 1))
+    assert all(answers[number].result == bytes(10**6) for number in (2, 3, 4, 5))
 
 
-def test_the_end_of_a_pool_does_not_race_with_the_exit_of_python() -> None:
-    """A pause where the handler at exit writes to the pool's pipe makes sure that its thread closes it meanwhile."""
-    code = """
-import time
-from concurrent.futures import process
-from d2rpick.base.workers import Cores
+def test_an_error_in_another_process_keeps_its_place_beside_its_message() -> None:
+    """The message stays one line, and ``--debug`` shows the line that failed."""
+    with Cores(2, __name__) as workers:
+        (answer,) = workers.answers(square, [13])
+    assert answer.error
+    assert str(answer.error) == "thirteen"
+    assert "in square" in "".join(answer.error.__notes__)
 
-def write_late(pipe):
-    if not pipe._closed:
-        time.sleep(0.3)
-        pipe._writer.send_bytes(b"")
 
-process._ThreadWakeup.wakeup = write_late
-with Cores(2, "json") as farm:
-    print(sorted(answer.result for answer in farm.answers(abs, [1, -2])))
-"""
-    result = subprocess.run(
-        [sys.executable, "-c", code],
-        capture_output=True,
-        text=True,
-        check=True,
-        timeout=TIME_LIMIT,
-    )
-    assert (result.stdout, result.stderr) == ("[1, 2]\n", "")
+def test_items_larger_than_a_pipe_reach_their_process() -> None:
+    with Cores(2, __name__) as workers:
+        lengths = [answer.result for answer in workers.answers(len, [bytes(10**6)] * 9)]
+    assert lengths == [10**6] * 9
+
+
+def test_answers_that_nobody_awaited_are_no_answers_of_later_calls() -> None:
+    with Cores(2, __name__) as workers:
+        first = workers.answers(square, [0] * 9)
+        assert next(first).result == 0
+        assert isinstance(first, Generator)
+        first.close()
+        later = {answer.number: answer.result for answer in workers.answers(abs, [-5])}
+    assert later == {0: 5}
 
 
 def test_there_is_a_core() -> None:

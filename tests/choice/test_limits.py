@@ -1,12 +1,12 @@
 """A limit of a recommendation refuses pairs, is explained, and cuts windows, whatever quantity it limits."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 from hypothesis import given, settings, strategies as st
 
+from d2rpick.base.data_classes import dataclass
 from d2rpick.choice.answers import suggest_in_history, verify_in_history
 from d2rpick.choice.options import Limit
 from d2rpick.choice.pair.windows import find_acceptable_windows
@@ -24,7 +24,7 @@ REFERENCE = read_reference([ENERGY])
 ENDLESS = 1.0
 
 
-@dataclass(eq=False, repr=False, kw_only=True)
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class WithLeastRigidTime(Settings):
     """Settings with a made-up limit: the shortest rigid time that is worth a restart [time]."""
 

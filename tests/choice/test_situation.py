@@ -11,7 +11,7 @@ from d2rpick.choice.answers import suggest_at, suggest_in_history
 from d2rpick.choice.pair.situation import examine_td
 from d2rpick.choice.question import Settings, read_reference
 from d2rpick.flight.position_error import RigidBody
-from d2rpick.histories.history import History
+from d2rpick.histories.history import EXACT, History, Momenta
 from d2rpick.histories.opening import Selection
 from d2rpick.vibration import measures
 from d2rpick.vibration.oscillator import to_mode
@@ -24,6 +24,7 @@ from tests.energies import (
     require,
 )
 from tests.reading import read
+from tests.records import make_table
 from tests.relations import list_columns, make_run, write_csv
 
 PLAIN = Settings()
@@ -147,6 +148,36 @@ def test_what_was_found_with_another_end_of_the_load_changes_nothing(
     ).candidates[:]
     assert other_candidates != fresh
     assert suggest_at(examine_td(history, td, PLAIN)).candidates[:] == fresh
+
+
+@pytest.mark.parametrize(
+    ("push", "td", "given"),
+    [
+        # A force acts in the flight that is given, and the momentum shows another flight, later or earlier.
+        ((0.0, 0.5), 0.4, {"after": 0.03}),
+        ((0.0, 0.5), 0.4, {"after": 0.03, "landing": 0.45}),
+        ((0.3, 1.0), 0.8, {"after": 0.31}),
+        ((0.3, 1.0), 0.8, {"after": 0.31, "landing": 0.9}),
+        # The flight that the momentum shows ends before td.
+        ((0.5, 1.0), 0.8, {"landing": 0.9}),
+        ((0.5, 1.0), 0.8, {"after": 0.1, "landing": 0.9}),
+    ],
+)
+def test_the_vibration_in_a_given_flight_does_not_depend_on_the_flight_that_is_shown(
+    push: tuple[float, float], td: float, given: dict[str, float]
+) -> None:
+    time = np.linspace(0.0, 1.0, 1001)
+    energy = 5 + 5 * np.exp(-0.5 * time) * np.sin(30 * time) ** 2
+    energy += 800 * np.clip(time - (td + 0.05), 0, 0.05)
+    momentum = np.zeros((time.size, 1, 3))
+    momentum[:, 0, 0] = 500 - 40 * (np.clip(time, *push) - push[0])
+    whole = Momenta(time, momentum, None, EXACT, (0,), masses=np.array([10.0]))
+    settings = Settings(**given)  # type: ignore[arg-type]
+    denied = suggest_in_history(make_table(time, energy, whole), td, settings)
+    plain = suggest_in_history(make_table(time, energy), td, settings)
+    assert any("used as given" in doubt for doubt in denied.flight.doubts)
+    assert denied.basis == plain.basis == "oscillator"
+    assert [row.tr for row in denied.candidates] == [row.tr for row in plain.candidates]
 
 
 def make_one_mode() -> History:

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import tomllib
 from collections.abc import Callable
 from csv import DictReader
@@ -829,6 +830,24 @@ def test_a_check_without_a_history_says_that_it_has_judged_no_times() -> None:
     assert message not in run("check", "none.k").stdout
 
 
+@pytest.mark.parametrize(
+    ("arguments", "line"),
+    [
+        (
+            (DECK,),
+            "passed  no errors or warnings; the times were not judged, because no history was given",
+        ),
+        ((DECK, "--history", GLSTAT), "found  1 error and 1 warning"),
+        (("none.k",), "passed  no errors or warnings"),
+    ],
+)
+def test_the_first_line_says_what_was_found_in_one_deck(
+    arguments: tuple[str, ...], line: str
+) -> None:
+    place("none.k", HEAD + END)
+    assert run("check", *arguments).stdout.splitlines()[0] == line
+
+
 def test_findings_are_rows_of_csv_and_markdown_too() -> None:
     check_report = run_json("check", DECK, "--history", GLSTAT)["findings"]
     csv, markdown = (
@@ -896,7 +915,7 @@ def test_without_a_history_no_window_has_a_verdict() -> None:
         assert (window["verdict"], window["verdict_reason"], window["cure"]) == (
             None,
         ) * 3
-    assert "use" not in run("check", DECK).stdout
+    assert not re.search(r"\buse\b", run("check", DECK).stdout)
 
 
 def test_the_step_after_a_check_explains_an_error_above_all_warnings() -> None:

@@ -115,7 +115,7 @@ def test_the_best_pair_of_a_flight_is_not_cured_by_other_times() -> None:
     suggestion = run_json("suggest", *chosen)
     assert suggestion["verdict"] == "use with care"
     cure = suggestion["cure"]
-    assert cure.startswith("no clearly better pair was found for td from 0.086 to ")
+    assert cure.startswith("nothing clearly better was found for td from 0.086 to ")
     assert "explore" not in cure
     explored = " ".join(run("explore", *chosen, "--steps", "20").stdout.split())
     assert f"to improve {cure} expect" in explored

@@ -114,6 +114,10 @@ def test_info_refuses_files_whose_flight_lasts_longer_than_the_energy() -> None:
             "the longest flight, from 0.086 to 0.379, reaches outside",
         ),
         (
+            ("explore", "--td", "0.1", MATSUM, ENERGY),
+            "the flight that contains --td, from 0.086 to 0.379, reaches outside",
+        ),
+        (
             ("parts", "--deck", str(SAMPLES / "oscillator"), MATSUM),
             "this is a folder; give the main deck in it",
         ),
@@ -426,7 +430,7 @@ def test_the_step_to_the_card_keeps_the_merged_part(tmp_path: Path) -> None:
 @pytest.mark.parametrize("text", ["suggest --td 0.37", "explore --td 0.37"])
 def test_verify_and_the_choice_give_one_cure_for_a_pair(text: str) -> None:
     cure = find_line("to improve", "verify", *WITH_CARE, MATSUM)
-    assert cure.startswith("no clearly better pair was found for td from 0.086 to ")
+    assert cure.startswith("nothing clearly better was found for td from 0.086 to ")
     assert find_line("to improve", *text.split(), *FLYING) == cure
     assert find_line("to improve", "suggest", *FLYING) == cure
     assert find_line("to improve", "explore", *FLYING) == cure

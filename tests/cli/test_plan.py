@@ -477,3 +477,23 @@ def test_a_plan_explains_a_window_whose_vibration_error_is_only_small_beside_the
     assert "limit for use: 1%" in run("suggest", BOX).stdout
     flights = re.findall(r"^flight (\d+) ", screen, re.MULTILINE)
     assert flights == sorted(flights, key=int)
+
+
+def test_a_plan_says_how_exactly_tr_has_to_be_met_as_suggest_does(
+    tmp_path: Path,
+) -> None:
+    """The planned window of this run is the pair that suggest chooses."""
+    page = tmp_path / "plan.html"
+    suggestion = run("suggest", ENERGY).stdout
+    (line,) = (row for row in suggestion.splitlines() if row.startswith("tr  "))
+    words = " ".join(line.split()[1:])
+    assert words.startswith("accurate to ±")
+    assert "; timing tolerance ±" in words
+    screen = join_wrapped_lines(run("plan", "--report", str(page), ENERGY).stdout)
+    assert re.search(rf" flight 1 tr = [\d.]+: {re.escape(words)} history ", screen)
+    assert words in page.read_text()
+    assert words in run("plan", "-f", "markdown", ENERGY).stdout
+    (window,) = run_json("plan", ENERGY)["windows"]
+    pair = run_json("suggest", ENERGY)["candidates"][0]
+    for key in ("timing_tolerance", "tr_low", "tr_high"):
+        assert window[key] == pair[key]

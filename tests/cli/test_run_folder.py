@@ -126,6 +126,24 @@ def test_parts_that_share_nodes_are_merged_and_the_pasted_card_is_clean(
     assert "parts 1, 2: rigid" in check_with_card(box, card)
 
 
+def test_a_deck_with_encrypted_elements_is_not_written_as_if_no_parts_shared_nodes(
+    tmp_path: Path,
+) -> None:
+    head, _, rest = DECK.read_text("utf-8").partition("*ELEMENT_SHELL")
+    encrypted = "-----BEGIN PGP MESSAGE-----\n\nhQEMA1\n-----END PGP MESSAGE-----\n"
+    model = f"{head}{encrypted}*LOAD_BODY_Z{rest.partition('*LOAD_BODY_Z')[2]}"
+    deck = str(put(tmp_path / "main.k", model))
+    question = ("plan", MATSUM, "--part", "1,2", "--deck", deck)
+    written = ("--write-deck", str(tmp_path / "written"))
+    for form in (written, ("-f", "card")):
+        messages = run(*question, *form).stderr
+        assert "parts-not-joined: d2rpick could not read all elements" in messages
+    alone = run("card", "--tr", "0.1", "--td", "0.3", "--part", "1,2", "--deck", deck)
+    assert "parts-not-joined: d2rpick could not read all elements" in alone.stderr
+    merged = run(*question, "--merge", "1", *written, "--overwrite")
+    assert "parts-not-joined" not in merged.stderr
+
+
 def test_without_a_deck_the_card_says_that_nobody_knows_what_is_joined(
     box: Path,
 ) -> None:

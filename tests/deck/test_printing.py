@@ -244,7 +244,7 @@ def test_warnings_are_those_that_apply() -> None:
     def text(printing: Printing) -> str:
         return print_cards([(0.02, 0.09)], printing).text
 
-    assert "d2rpick card --merge" in text(PARTS)
+    assert "Merge parts that share nodes (--merge)" in text(PARTS)
     assert "merged" not in text(MERGED)
     assert "merged" not in text(Printing(part=(11,)))
     assert "already" in text(PARTS._replace(merge=5))

@@ -7,6 +7,7 @@ import pytest
 
 from d2rpick.base.errors import HistoryError
 from d2rpick.choice.question import read_reference
+from d2rpick.histories.history import Samples
 from d2rpick.histories.names import Selection
 from tests.command import put, run
 
@@ -37,22 +38,25 @@ def refuse(file: str, *parts: str) -> str:
 
 
 @pytest.mark.parametrize(
-    ("energy", "expected"),
+    ("energy", "shown"),
     [
-        ("1e9", "is 1e+09 in the single state at 0.05, but at most 282.6 (the largest"),
-        ("1e4", "is 10000 in the single state at 0.05, but at most 282.6 (the largest"),
-        ("300", "is 300 in the single state at 0.05, but at most 282.6 (the largest"),
-        ("-500", "is -500 in the single state at 0.05, but at least 0 was expected"),
+        ("1e9", "1e+09"),
+        ("1e4", "10000"),
+        ("300", "300"),
+        ("100", "100"),
+        ("-50", "-50"),
     ],
 )
 def test_a_damaged_energy_of_a_table_is_named_with_its_line(
-    energy: str, expected: str, tmp_path: Path
+    energy: str, shown: str, tmp_path: Path
 ) -> None:
     """Before, plan said "use", because nothing vibrates beside an energy of 1e9."""
     file = damage_line("energy.csv", 502, "0.08340760542299112", energy, tmp_path)
     message = refuse(file)
-    assert message.startswith(f":502: internal_energy {expected}")
-    assert message.endswith("was expected; repair or delete the line")
+    assert message == (
+        f":502: internal energy is {shown} in the single state at 0.05, but about 0.0839331 (by the total energy of "
+        "the neighbouring states) was expected; repair or delete the line"
+    )
     for command in ("plan", "info", "explore"):
         answer = run(command, file)
         assert answer.exit_code == 2
@@ -128,6 +132,56 @@ def test_a_contact_of_a_single_state_is_no_damage(tmp_path: Path) -> None:
     head = "time,internal_energy,kinetic_energy"
     file = put(tmp_path / "bounce.csv", f"{head}\n{rows}\n".encode())
     assert read_all(str(file))
+
+
+@pytest.mark.parametrize(
+    ("state", "count", "factor", "column"),
+    [
+        (500, 1, 0.5, "internal"),
+        (500, 2, 0.5, "internal"),
+        (500, 1, 3.0, "internal"),
+        (500, 2, 3.0, "internal"),
+        (512, 1, 3.0, "kinetic"),
+        (512, 2, 3.0, "kinetic"),
+        (504, 1, 0.0, "internal"),
+        (504, 2, 0.0, "internal"),
+    ],
+)
+def test_damaged_energies_below_the_total_energy_do_not_fit_those_beside_them(
+    state: int, count: int, factor: float, column: str, tmp_path: Path
+) -> None:
+    """An energy that is too low, or two damaged states, were not noticed before."""
+    energies = {
+        "internal": 40 + 30 * np.cos(0.1 * np.arange(1001)),
+        "kinetic": 40 - 30 * np.cos(0.1 * np.arange(1001)),
+    }
+    table = write_energies(energies["internal"], energies["kinetic"])
+    assert read_all(str(put(tmp_path / "sound.csv", table)))
+    right = energies[column][state]
+    energies[column][state : state + count] *= factor
+    table = write_energies(energies["internal"], energies["kinetic"])
+    message = refuse(str(put(tmp_path / "damaged.csv", table)))
+    wrong = energies[column][state]
+    assert message.startswith(f":{state + 2}: {column} energy is {wrong:.6g} ")
+    assert f", but about {right:.6g} " in message
+    assert message.endswith("the line" if count == 1 else "these lines")
+
+
+def test_a_contact_that_stores_kinetic_energy_in_a_single_state_is_no_damage(
+    tmp_path: Path,
+) -> None:
+    """A contact is a spring, whose energy is neither internal nor kinetic."""
+    internal = np.full(STATES.size, 1.0)
+    kinetic = np.full(STATES.size, 50.0)
+    kinetic[40] = 3.0
+    assert read_all(str(put(tmp_path / "hit.csv", write_energies(internal, kinetic))))
+
+
+def write_energies(internal: Samples, kinetic: Samples) -> bytes:
+    """Return a table of two energies at 1, 2, 3, ..."""
+    rows = zip(internal.tolist(), kinetic.tolist(), strict=True)
+    lines = [f"{t},{i!r},{k!r}" for t, (i, k) in enumerate(rows, start=1)]
+    return "\n".join(["time,internal_energy,kinetic_energy", *lines, ""]).encode()
 
 
 def test_a_place_without_a_line_is_a_state(tmp_path: Path) -> None:

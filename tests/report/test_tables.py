@@ -2,7 +2,10 @@
 
 import csv
 import io
+import sys
+import unicodedata
 
+import pytest
 from hypothesis import given, strategies as st
 
 from d2rpick.report.tables import Cell, as_csv, as_text, wrap_lines
@@ -108,6 +111,28 @@ def test_no_text_of_a_csv_is_a_formula(text: str) -> None:
         if begin in "=+-@＝＋－＠":
             assert not begin or isinstance(float(piece), float)
     assert read_cell(text).replace("'", "") == text
+
+
+@pytest.mark.parametrize("before", ["", " ", "\u00a0", "\u3000", "a;", "a; "])
+def test_a_sign_that_normalisation_makes_the_begin_of_a_formula_is_treated_as_such(
+    before: str,
+) -> None:
+    """The small equals sign, for example, becomes "=" where a program normalises text."""
+    signs = [
+        sign
+        for sign in map(chr, range(sys.maxunicode + 1))
+        if unicodedata.normalize("NFKC", sign).startswith(("=", "+", "-", "@"))
+    ]
+    assert "\N{SMALL EQUALS SIGN}" in signs
+    assert [read_cell(f"{before}{sign}A1") for sign in signs] == [
+        f"{before}'{sign}A1" for sign in signs
+    ]
+
+
+@pytest.mark.parametrize("before", ["\t", "\r", "\n", "\x00", "\ufeff"])
+def test_a_control_code_before_a_sign_is_a_printed_code(before: str) -> None:
+    """The cell then begins with a backslash, so that no spreadsheet treats it as a formula."""
+    assert read_cell(f"{before}=A1").startswith("\\")
 
 
 @given(st.floats(allow_nan=False, allow_infinity=False) | st.integers())

@@ -141,5 +141,5 @@ def test_most_later_windows_that_are_planned_at_once_are_too_late_as_the_docs_sa
     page = (ROOT / "docs/explanation/validation-motion.md").read_text("utf-8")
     words = dict(enumerate(("four", "five", "six"), start=4))
     assert len(rows) == 9
-    assert f"In {words[int((late > 0).sum())]} of them the box is" in page
+    assert f"In {words[int((late > 0).sum())]} of the nine windows, the box is" in page
     assert f"is up to {1e3 * late.max():.0f} ms too late" in page

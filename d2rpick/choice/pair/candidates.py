@@ -6,13 +6,13 @@ All candidates are judged together, as columns; a `Candidate` is built only when
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import accumulate, pairwise
 from typing import TYPE_CHECKING, Any, Final, overload
 
 import numpy as np
 
 from d2rpick.base.caching import cached_property
+from d2rpick.base.data_classes import dataclass
 from d2rpick.base.tuples import NamedTuple, Record
 from d2rpick.choice.pair.warnings import POOR_RESIDUAL, Objection, list_objections
 from d2rpick.histories.digits import round_up_as_read

@@ -289,7 +289,7 @@ class Decision(NamedTuple):
         usable = _USE_COMPARED if self.is_compared else _USE_BEST
         advice = _AVOID_BEST if self.grade == POOR else usable
         longer = _RUN_LONGER if self.ends_in_flight else ""
-        return f"no clearly better pair was found for td from {low:.6g} to {high:.6g}{longer}: {advice}"
+        return f"nothing clearly better was found for td from {low:.6g} to {high:.6g}{longer}; {advice}"
 
 
 def join_cures(cures: Iterable[str]) -> str:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache, partial
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from d2rpick.base.caching import cached_property
+from d2rpick.base.data_classes import dataclass
 from d2rpick.base.errors import RangeError
 from d2rpick.base.memory import remember
+from d2rpick.base.tuples import NamedTuple
 from d2rpick.choice.pair.together import PartsTogether
 from d2rpick.choice.parts.margins import find_drift_of_bodies, find_margin
 from d2rpick.choice.question import FEWEST_STATES
@@ -311,15 +313,11 @@ def examine_td(
     """
     _check_times(history, td, settings)
     seen = find_seen_flight(history, td)
-    fitted_at = _choose_time_of_fit(seen, td)
-    is_shown = seen.flight is not None or seen.refusal is not None
+    fitted_at, bounds, is_shown = _choose_search(history, td, seen, settings)
     is_given = settings.oscillator is not None or settings.fit_window is not None
     span: Span | None = None
     fit: Identification | None = None
     if settings.replay:
-        bounds = limit_bounds(
-            _get_bounds(history, seen), fitted_at, settings.after, settings.landing
-        )
         search = SpanSearch(
             history, bounds, settings.oscillator, whole=is_shown, quick=quick
         )
@@ -368,14 +366,40 @@ def _find_modes(
     return find_described(history, td, _get_quiet_window(history, quiet))
 
 
-def _choose_time_of_fit(seen: Seen, td: float) -> float:
-    """Return the time around which an oscillator is fitted to the energy [time].
+class _Search(NamedTuple):
+    """A search for the vibration around ``td``, within ``bounds`` [time].
 
-    If td is not in a flight, the oscillator of the nearest flight shows which pairs exist in that flight.
+    ``is_shown`` is True if the evidence decides whether td is in a flight.
     """
-    if seen.refusal and seen.flight:
-        return (seen.flight.start + seen.flight.end) / 2
-    return td
+
+    td: float
+    bounds: Span
+    is_shown: bool
+
+
+def _choose_search(
+    history: History, td: float, seen: Seen, settings: Settings
+) -> _Search:
+    """Choose where an oscillator is fitted to the energy.
+
+    If td is not in a flight, the oscillator of the nearest flight shows which pairs exist in that flight. If only the
+    user states that td is in a flight, the evidence shows at most another flight, whose vibration is a different one.
+    """
+    is_shown = seen.flight is not None or seen.refusal is not None
+    start, end, fitted_at = history.start, history.end, td
+    if seen.flight:
+        start, end = seen.flight.start, seen.flight.end
+    if seen.refusal:
+        given = choose_flight(
+            history, td, seen, None, None, settings.after, settings.landing
+        )
+        if given.start is not None and not given.refusal:
+            is_shown = False
+            start, end = given.start, history.end
+        elif seen.flight:
+            fitted_at = (start + end) / 2
+    bounds = limit_bounds(Span(start, end), fitted_at, settings.after, settings.landing)
+    return _Search(fitted_at, bounds, is_shown)
 
 
 def _check_times(history: History, td: float, settings: Settings) -> None:
@@ -442,13 +466,6 @@ def _limit_start(situation: Situation, since: float) -> Situation:
     if flight.start is None or flight.start >= since:
         return situation
     return replace(situation, flight=flight._replace(start=since))
-
-
-def _get_bounds(history: History, seen: Seen) -> Span:
-    """Return the bounds of the flight according to the evidence; if there is none, those of the whole record [time]."""
-    if seen.flight:
-        return Span(seen.flight.start, seen.flight.end)
-    return Span(history.start, history.end)
 
 
 def _get_quiet_window(history: History, quiet: QuietTime | None) -> Span | None:

@@ -14,13 +14,13 @@ their default ratio to the others.
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
+from d2rpick.base.data_classes import dataclass
 from d2rpick.base.errors import Caution, ConfigurationError, DeckError, FormatError
 from d2rpick.choice.parts.cost import (
     ELEMENT_SHARE,

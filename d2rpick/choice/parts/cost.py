@@ -14,10 +14,11 @@ m is the time step while the parts are rigid divided by that before (`d2rpick.vi
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from d2rpick.base.caching import cached_property
+from d2rpick.base.data_classes import dataclass
 from d2rpick.base.errors import ConfigurationError, choose_verb, name_units
 from d2rpick.histories.source import Source
 

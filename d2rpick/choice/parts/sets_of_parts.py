@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
 from d2rpick.base.caching import cached_property
+from d2rpick.base.data_classes import dataclass
 from d2rpick.base.errors import (
     Caution,
     FormatError,

@@ -12,6 +12,7 @@ from d2rpick.flight.flight import (
     NEVER_FLIES,
     Flight,
     denies_every_flight,
+    describe_hiding_digits,
     find_all_seen,
     list_witnesses,
 )
@@ -81,7 +82,9 @@ def find_longest_flight(
             cure = COPY_AGAIN
         elif denies_every_flight(history):
             reason = f"{reason}: {NEVER_FLIES}"
+            hint = describe_hiding_digits(history)
             cure = "run it without switching, or write the momenta of the parts and choose those that fly"
+            cure = f"{hint}; otherwise, {cure}" if hint else cure
         else:
             cure = "if you know the end of the load, give it as `after`"
         raise RangeError(f"{', '.join(history.source)}: {reason}; {cure}")
@@ -97,6 +100,17 @@ def find_longest_flight(
     )
     latest = compute_last_td(end, find_margin(history, longest, settings).time)
     return start, latest if longest.source == "energy" and latest > start else end
+
+
+def check_chosen_flight(
+    history: History, window: tuple[float, float], around: float | None = None
+) -> None:
+    """Raise RangeError if the ``window`` that `find_longest_flight` returned lies outside the record of the energy."""
+    if around is not None and window[0] < around <= window[1]:
+        subject = "the flight that contains `td`,"
+    else:
+        subject = "the longest flight,"
+    history.check(*window, subject=subject)
 
 
 def has_other_flights(history: History, settings: Settings, td: float) -> bool:

@@ -10,11 +10,12 @@ Each window that freezes energy requires a further run, so a short window is lef
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from d2rpick.base.data_classes import dataclass
 from d2rpick.base.errors import Caution
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.choice.answers import suggest_in_run

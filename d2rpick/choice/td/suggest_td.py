@@ -23,7 +23,11 @@ from d2rpick.choice.pair.quality import (
 )
 from d2rpick.choice.pair.situation import Situation, make_look
 from d2rpick.choice.pair.warnings import compute_mean_in_flight, compute_shortfall
-from d2rpick.choice.td.flights import MIN_RIGID, find_longest_flight
+from d2rpick.choice.td.flights import (
+    MIN_RIGID,
+    check_chosen_flight,
+    find_longest_flight,
+)
 from d2rpick.flight import SOURCES
 from d2rpick.flight.internal_energy import round_off
 from d2rpick.histories.digits import round_down_as_read, sum_times_as_read
@@ -155,7 +159,7 @@ def choose_td(
     """
     if window is None:
         window = find_longest_flight(history, settings)
-        history.check(*window, subject="the longest flight,")
+        check_chosen_flight(history, window)
     look = make_look(history, settings, since)
     situation, inside = find_best_known(look, history, window)
     chosen, longest = _choose_by_model(situation, inside, look)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import accumulate
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from d2rpick.base.caching import cached_property
+from d2rpick.base.data_classes import dataclass
 from d2rpick.base.errors import Caution, RangeError
 from d2rpick.choice.answers import (
     PairSuggestion,
@@ -28,7 +29,7 @@ from d2rpick.choice.pair.quality import (
 from d2rpick.choice.pair.situation import AnswerAtTd, Situation, make_look
 from d2rpick.choice.pair.warnings import warn_about_td
 from d2rpick.choice.switched.frozen import RIGID_TIMES
-from d2rpick.choice.td.flights import find_longest_flight
+from d2rpick.choice.td.flights import check_chosen_flight, find_longest_flight
 from d2rpick.choice.td.suggest_td import (
     STEPS,
     find_best_known,
@@ -261,7 +262,7 @@ def explore_run(
         history, settings, around=td, otherwise=None if td is None else record
     )
     if td_window is None:
-        history.check(*window, subject="the longest flight,")
+        check_chosen_flight(history, window, td)
     look = make_look(history, settings, since)
     known_best, inside = find_best_known(look, history, window)
     offered, peaks = list_offered_times(known_best, inside, steps)

@@ -7,12 +7,12 @@ values are never shifted.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from d2rpick.base.caching import cached_property
+from d2rpick.base.data_classes import dataclass
 from d2rpick.base.errors import FormatError, list_names
 from d2rpick.histories.database import Database
 from d2rpick.histories.names import clean_text

@@ -32,7 +32,7 @@ _MISSING: Final = _SPREADSHEET_ERRORS | frozenset(
      "n.a.", "k.a.", "nd", "?", ".", "-", "--", "---", "–", "—"}
 )  # fmt: skip
 # Pattern of the characters that are printed when a number is too wide for its field.
-_OVERFLOW: Final = re.compile(r"\*+|#{2,}")
+_OVERFLOW: Final = r"\*+|#{2,}"
 
 # Pattern of a number, keyed by decimal sign.
 # The possessive quantifiers prevent backtracking, so that the matching time is proportional to the cell length.
@@ -45,9 +45,7 @@ _GROUPED: Final = r"[+-]?[1-9]\d{0,2}(?:%s\d{3})+(?:%s\d*)?"
 # Thousands separators that are tried in addition to "." and ",".
 _THOUSANDS: Final = ("'", "’", "\N{NO-BREAK SPACE}", "\N{NARROW NO-BREAK SPACE}", " ")
 # Pattern of a date, clock time or percentage, which is not a number but does not make the separator implausible.
-_DATE_OR_SHARE: Final = re.compile(
-    r"\d{1,4}[-/.:]\d{1,2}[-/.:]\d.*|[-+]?[\d.,]+\s*%", re.ASCII
-)
+_DATE_OR_SHARE: Final = r"(?a)\d{1,4}[-/.:]\d{1,2}[-/.:]\d.*|[-+]?[\d.,]+\s*%"
 # Characters of the lines that separate rows or surround a table.
 _RULE: Final = "-=+|:_ \t"
 _RULE_STARTS: Final = ("-", "=", "+", "|", ":")
@@ -160,7 +158,7 @@ def _written_number(cell: str, decimal: str, thousands: str) -> str | None:
 
 def is_missing(cell: str) -> bool:
     """Return True if a cell is empty or marks a missing number (``NaN``, ``n/a``, ``#DIV/0!``, ``****``)."""
-    return cell.casefold() in _MISSING or _OVERFLOW.fullmatch(cell) is not None
+    return cell.casefold() in _MISSING or re.fullmatch(_OVERFLOW, cell) is not None
 
 
 def is_word(cell: str) -> bool:
@@ -168,7 +166,7 @@ def is_word(cell: str) -> bool:
 
     A word begins with a letter, because a wrong separator may cut cells such as "5 load 1" out of "0,5 load 1,5".
     """
-    return cell[0].isalpha() or _DATE_OR_SHARE.fullmatch(cell) is not None
+    return cell[0].isalpha() or re.fullmatch(_DATE_OR_SHARE, cell) is not None
 
 
 def find_thousands(cells: Sequence[str], decimal: str) -> str:

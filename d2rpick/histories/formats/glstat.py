@@ -42,7 +42,7 @@ _CONTROL: Final = b"\n dt of cycle"
 _LAST: Final = "time per zone cycle.(nanosec)"
 _LINE: Final = re.compile(rb"^ ([A-Za-z][^=\r\n]{29}\.)([^\r\n]*)\r?$", re.MULTILINE)
 # Pattern of a value. Each rigid wall has its own line, in which the number of the wall follows the value.
-_VALUE: Final = re.compile(rb".{14}(?: +(wall# *\d+))?(?=[ \t]|$)")
+_VALUE: Final = rb".{14}(?: +(wall# *\d+))?(?=[ \t]|$)"
 
 # Pattern of variable text in other lines: numbers, and the element that controls the time step.
 _CHANGING: Final = re.compile(
@@ -147,7 +147,7 @@ def _describe_glstat_block(
         is_mixed |= name in fields and b"..." in block[end : line.start()]
         name = line[1].rstrip(b".").rstrip().decode("latin-1")
         end = line.end()
-        value = _VALUE.match(line[2])
+        value = re.match(_VALUE, line[2])
         if value is None:
             fields[name] = UNSURE
             continue

@@ -9,12 +9,13 @@ from __future__ import annotations
 import math
 import re
 from functools import cache
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from d2rpick.base.errors import FormatError
 from d2rpick.base.files import describe_unpacked_excess
+from d2rpick.base.tuples import NamedTuple
 from d2rpick.histories.meaning import is_time
 
 if TYPE_CHECKING:
@@ -24,10 +25,9 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.history import Samples
 
-_PICKLED_NAME: Final = re.compile(rb"^a?V([^\n]*)$", re.MULTILINE)
-_PICKLED_INDEX_NAME: Final = re.compile(
-    rb"^s?a?Vindex_name\n(?:p\d+\n)?V([^\n]*)$", re.MULTILINE
-)
+# These patterns are compiled on first use to keep start-up fast.
+_PICKLED_NAME: Final = rb"(?m)^a?V([^\n]*)$"
+_PICKLED_INDEX_NAME: Final = rb"(?m)^s?a?Vindex_name\n(?:p\d+\n)?V([^\n]*)$"
 # Name prefixes of groups that contain no histories, e.g. PyTables index trees and MATLAB references.
 _BOOKKEEPING: Final = ("_i_", "#")
 _ERF_BLOCK: Final = "/erfblock"
@@ -339,7 +339,7 @@ def _list_compound_columns(
 def _list_table_columns(name: str, group: h5py.Group) -> Iterator[Column]:
     """Yield the columns of a data frame stored in the "table" format of pandas."""
     info = bytes(_read_attribute_text(group.attrs.get("info")), "utf-8")
-    match = _PICKLED_INDEX_NAME.search(info)
+    match = re.search(_PICKLED_INDEX_NAME, info)
     index_name = match[1].decode() if match else "index"
     yield from _list_compound_columns(f"{name}/table", group["table"], index_name)
 
@@ -415,5 +415,7 @@ def _read_pickled_names(value: object) -> list[str]:
     """Return the names in a list of strings that pandas pickled."""
     return [
         name.decode("raw-unicode-escape")
-        for name in _PICKLED_NAME.findall(bytes(_read_attribute_text(value), "utf-8"))
+        for name in re.findall(
+            _PICKLED_NAME, bytes(_read_attribute_text(value), "utf-8")
+        )
     ]

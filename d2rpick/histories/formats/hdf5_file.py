@@ -10,6 +10,7 @@ import io
 import os
 import signal
 import struct
+import sys
 from contextlib import contextmanager, suppress
 from importlib import import_module
 from typing import TYPE_CHECKING, BinaryIO, Final
@@ -115,6 +116,7 @@ class Columns(Database):
         self._opened, self._content, self.source = opened, content, source
         with _explain_damage(source):
             self._columns = find_columns(opened)
+        self._times = [column for column in self._columns if column.is_time]
         self._named_time: Column | None = None
         if selection.time:
             self._named_time = _find_named_column(selection.time, self._columns, source)
@@ -171,11 +173,7 @@ class Columns(Database):
 
     def _check_own_times(self, column: Column) -> None:
         """Raise FormatError if the times in the group of a column differ from the times of the energy."""
-        times_of_group = [
-            time
-            for time in self._columns
-            if time.is_time and time.group == column.group
-        ]
+        times_of_group = [time for time in self._times if time.group == column.group]
         if len(times_of_group) != 1:
             return
         own_time = times_of_group[0]
@@ -388,11 +386,32 @@ def _choose_only_column(
 def _import_library(source: str) -> None:
     """Import h5py before a process is forked, so that it is imported only once; raise FormatError if it is missing."""
     try:
-        import_module("h5py")
+        with _without_name_of_processor():
+            import_module("h5py")
     except ImportError:
         raise FormatError(
             f"{source}: HDF5 files need h5py; pip install h5py, or export the columns as CSV"
         ) from None
+
+
+@contextmanager
+def _without_name_of_processor() -> Iterator[None]:
+    """Let `platform.uname` contain no name of the processor.
+
+    h5py reads the name of the machine there. Python would also start the program ``uname`` for that of the processor,
+    which takes a sixth of the time of h5py's import.
+    """
+    import platform
+
+    names = vars(platform.uname())
+    if "processor" in names:
+        yield
+        return
+    names["processor"] = ""
+    try:
+        yield
+    finally:
+        del names["processor"]
 
 
 @contextmanager
@@ -469,10 +488,11 @@ def _head_and_size(file: BinaryIO) -> tuple[bytes, int]:
 def _read_and_exit(file: BinaryIO, source: str, seconds: int, write_end: int) -> None:
     """Read all data that could crash the library, write the message of any FormatError to ``write_end``, and exit."""
     try:
-        import faulthandler
         import resource
 
-        faulthandler.disable()
+        # Python has imported this module if it, or the user, has made it print a traceback after a crash.
+        if "faulthandler" in sys.modules:
+            sys.modules["faulthandler"].disable()
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
         limit = seconds + _head_and_size(file)[1] // _SLOWEST
         _, hard_limit = resource.getrlimit(resource.RLIMIT_CPU)
@@ -499,7 +519,7 @@ def _read_all_data(file: BinaryIO, source: str) -> None:
         if too_deep := describe_excess("DEPTH", name.count(b"/")):
             raise FormatError(f"{source}: its data lie in {too_deep}")
         if info.type == h5py.h5o.TYPE_DATASET:
-            dataset = h5py.h5d.open(opened.id, name)
+            dataset = h5py.h5d.open(opened, name)
             if dataset.get_create_plist().get_layout() == h5py.h5d.CHUNKED:
                 unpacked += h5py.Dataset(dataset).nbytes
                 if too_much := describe_unpacked_excess(size, unpacked):
@@ -508,8 +528,11 @@ def _read_all_data(file: BinaryIO, source: str) -> None:
                     check_data(h5py.Dataset(dataset), "")
                     h5py.Dataset(dataset)[()]
 
-    with h5py.File(file, "r") as opened:
-        h5py.h5o.visit(opened.id, visit, info=True)
+    # A child process pays for each page of memory that it uses, and `h5py.File` uses many.
+    access = h5py.h5p.create(h5py.h5p.FILE_ACCESS)
+    access.set_fileobj_driver(h5py.h5fd.fileobj_driver, file)
+    opened = h5py.h5f.open(b"content", h5py.h5f.ACC_RDONLY, access)
+    h5py.h5o.visit(opened, visit, info=True)
 
 
 def write(columns: Mapping[str, Samples]) -> bytes:

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 # Text at the start of the LS-DYNA listings d3hsp and messag.
 _LISTING_OF_LS_DYNA: Final = "Livermore Software"
 # Several words between separators, as in a line of headings.
-_SEPARATED_WORDS: Final = re.compile(r"[^\W\d][^,;\t]*([,;\t][^,;\t]+)+")
+_SEPARATED_WORDS: Final = r"[^\W\d][^,;\t]*([,;\t][^,;\t]+)+"
 # Pairs of a separator (None: spaces) and a decimal sign, in the order in which they are tried.
 # If the separator and the decimal sign are both commas, a row is readable only if its numbers are quoted.
 _FORMS = (
@@ -179,7 +179,7 @@ def _report_no_table(text: Text, lines: Sequence[str]) -> FormatError:
         if heading:
             problem = f"{text.name}: only one column, {quote_start(heading)}, was found"
         cure = "add a column with the times"
-    elif len(numbered) == 1 and _SEPARATED_WORDS.match(line.strip()):
+    elif len(numbered) == 1 and re.match(_SEPARATED_WORDS, line.strip()):
         cure = "write rows of numbers below the headings, or give another file"
     elif _LISTING_OF_LS_DYNA in line:
         problem = f"{text.name}:{number}: this is a listing of LS-DYNA"

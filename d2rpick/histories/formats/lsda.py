@@ -15,11 +15,11 @@ from __future__ import annotations
 import re
 import struct
 from array import array
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from d2rpick.base.data_classes import dataclass
 from d2rpick.base.errors import CHOOSE_FORMAT, FormatError
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.histories.content import Content, make_content
