@@ -32,6 +32,7 @@ from d2rpick.deck.ls_dyna_parts import (
     DeckParts,
     find_rigid_materials,
     find_set_nodes,
+    find_tied_contacts,
     name_material,
     read_constraints,
 )
@@ -407,12 +408,8 @@ def read_joints(deck: Deck) -> Joints:
 
 def read_tied_contacts(deck: Deck) -> Iterator[tuple[Card, Joint | None]]:
     """Yield each tied contact with its joint between two parts, or between nodes and a part; None if it is unknown."""
-    for card in deck.named("CONTACT"):
-        if (
-            card.name.startswith(("CONTACT_TIED", "CONTACT_SPOTWELD"))
-            or "TIEBREAK" in card.name
-        ):
-            yield card, _read_tied_contact(deck, card)
+    for card in find_tied_contacts(deck):
+        yield card, _read_tied_contact(deck, card)
 
 
 def _find_contact_line(card: Card) -> Row | None:

@@ -149,7 +149,7 @@ def write_trial_deck(main: str, card: PrintedCard, folder: str) -> str:
     targets = [Path(folder, os.path.relpath(place, root)) for place in places]
     for target, content in zip(targets, files.values(), strict=True):
         target.parent.mkdir(parents=True, exist_ok=True)
-        target.write_bytes(content)
+        write_as_a_whole(target, content)
     return str(targets[0])
 
 

@@ -18,6 +18,7 @@ from d2rpick.deck.ls_dyna_parts import (
     Constraint,
     DeckParts,
     find_element_cards,
+    find_tied_contacts,
     read_constraints,
     read_parts,
     read_sections,
@@ -266,6 +267,8 @@ class Case:
     @cached_property
     def ties(self) -> Sequence[tuple[Card, frozenset[int]]]:
         """Return the tied contacts whose parts are known, each with these parts."""
+        if not find_tied_contacts(self.deck):
+            return ()
         # Imported here to keep start-up fast.
         from d2rpick.deck.ls_dyna_inventory import find_parts_of_nodes
         from d2rpick.deck.ls_dyna_loads import read_tied_contacts
