@@ -73,15 +73,17 @@ def collect_objections(
             "d2rpick could not read all elements of the deck, so it is unknown whether these parts share nodes; "
             "merge parts that do with `merge`",
         )
+    from pathlib import Path
     from tempfile import TemporaryDirectory
 
-    from d2rpick.deck.writing import write_deck
+    from d2rpick.deck.writing import write_trial_deck
     from d2rpick.rules import check_deck
     from d2rpick.rules.base import ERROR, INFO
 
     with TemporaryDirectory() as folder:
         try:
-            checked = check_deck(write_deck(deck, card, folder)[0])
+            trial = write_trial_deck(deck, card, folder)
+            checked = check_deck(trial)
         except DeckError as error:
             yield Caution(
                 ERROR_OF_CARD, f"the card does not fit into the deck: {error}"
@@ -95,13 +97,14 @@ def collect_objections(
             for finding in findings
             if finding.severity is ERROR or finding.rule == _NEVER_DEFORMABLE
         ]
+        home = str(Path(trial).parent)
         told = set()
         for finding in (*severe, *findings):
             if (what := (finding.rule, finding.message)) in told:
                 continue
             told.add(what)
-            location = finding.file.removeprefix(f"{folder}/")
-            message = f"{finding.rule} ({finding.severity}): {finding.message.replace(f'{folder}/', '')}"
+            location = finding.file.removeprefix(f"{home}/")
+            message = f"{finding.rule} ({finding.severity}): {finding.message.replace(f'{home}/', '')}"
             yield Caution(
                 ERROR_OF_CARD if finding in severe else OBJECTION,
                 f"check of the deck with this card, {location}:{finding.line}: {message}",

@@ -54,6 +54,10 @@ class EnergyChoiceError(FormatError):
         return str(self.args[0])
 
 
+class DamageError(FormatError):
+    """A file contains a number that cannot be read, so it is damaged; the number was not left out by the solver."""
+
+
 class ChangedError(D2RPickError):
     """A file was rewritten while it was read, so its content mixes two versions and cannot be used."""
 
@@ -90,9 +94,17 @@ FORESEEN: Final = (D2RPickError, OSError, MemoryError)
 
 
 def give_if_written(read: Callable[[], _Read]) -> _Read | None:
-    """Return the result of ``read``; None if the files lack the data for any state."""
+    """Return the result of ``read``; None if the files lack the data for any state.
+
+    Raises
+    ------
+    DamageError
+        If the files contain the data, but one of the numbers cannot be read.
+    """
     try:
         return read()
+    except DamageError:
+        raise
     except FormatError:
         return None
 

@@ -27,6 +27,7 @@ from d2rpick.choice.pair.decision import (
     CHECK_SWITCHED_RUN,
     CHOOSE_ANOTHER,
     COMPARE_OTHER_WINDOW,
+    FINISH_SWITCHED_RUN,
     GIVE_END_OF_LOAD,
     GIVE_SWITCHED_RUN_OF_MODEL,
     Decision,
@@ -124,6 +125,8 @@ class PairVerdict(AnswerAtTd):
             return GIVE_SWITCHED_RUN_OF_MODEL
         if self.is_of_other_times:
             return COMPARE_OTHER_WINDOW
+        if self.is_incomplete:
+            return FINISH_SWITCHED_RUN
         if self._is_refuted:
             return CHECK_SWITCHED_RUN
         flight = self.situation.flight
@@ -170,7 +173,8 @@ class PairVerdict(AnswerAtTd):
     @cached_property
     def better(self) -> Pair | None:
         """A better pair with a grade other than "poor": that of ``suggest`` for this td, or what it names as better."""
-        if self._is_refuted or self.is_of_other_run or self.is_of_other_times:
+        is_of_other = self.is_of_other_run or self.is_of_other_times
+        if self._is_refuted or is_of_other or self.is_incomplete:
             return None
         good = self._good_pair
         if good is None or good.td != self.situation.td:
@@ -216,6 +220,11 @@ class PairVerdict(AnswerAtTd):
         return self.switched is not None and self.switched.is_of_other_times
 
     @property
+    def is_incomplete(self) -> bool:
+        """True if the switched run agrees with the reference run, but ended too early or with an error."""
+        return self.switched is not None and self.switched.is_incomplete
+
+    @property
     def _is_refuted(self) -> bool:
         """True if the finished switched run contradicts the pair that the reference run recommends.
 
@@ -223,6 +232,8 @@ class PairVerdict(AnswerAtTd):
         tolerance.
         """
         if self.switched is None or not self.switched.objections:
+            return False
+        if self.is_incomplete:
             return False
         good = self._good_pair
         if good is None:

@@ -467,9 +467,11 @@ def _read_history(run: OpenedRun, selection: Selection) -> History | None:
     for wanted in (selection.parts, selection.flying):
         if wanted:
             select_parts(wanted, run.parts, run.name)
-    history = give_if_written(lambda: run.history(selection))
-    if history:
-        run.check_energy(history)
+    try:
+        history = run.history(selection)
+    except FormatError:  # A warning reports the error.
+        return None
+    run.check_energy(history)
     return history
 
 

@@ -306,7 +306,7 @@ def verify(
         page=output.report or "",
     )
     if answer.switched and answer.switched.objections:
-        output.finish_with_failed_comparison()
+        output.finish_with_failed_comparison(is_incomplete=answer.is_incomplete)
     introduction = (
         "the comparison is within its limits, but " if answer.switched else ""
     )

@@ -331,11 +331,12 @@ class Output:
             )
         self.finish(objection=True)
 
-    def finish_with_failed_comparison(self) -> None:
-        """Exit with code 1, because the finished switched run disagrees with the reference run."""
+    def finish_with_failed_comparison(self, *, is_incomplete: bool) -> None:
+        """Exit with code 1, because the switched run disagrees with the reference run, or ended too early."""
         if not self.exit_zero:
+            result = "is incomplete" if is_incomplete else "failed"
             tell(
-                f"d2rpick: exit code {OBJECTION}: the comparison with the switched run failed, which --min-quality "
+                f"d2rpick: exit code {OBJECTION}: the comparison with the switched run {result}, which --min-quality "
                 "does not accept"
             )
         self.finish(objection=True)

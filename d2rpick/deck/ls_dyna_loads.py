@@ -32,6 +32,7 @@ from d2rpick.deck.ls_dyna_parts import (
     DeckParts,
     find_rigid_materials,
     find_set_nodes,
+    find_tied_contacts,
     name_material,
     read_constraints,
 )
@@ -399,24 +400,38 @@ def read_joints(deck: Deck) -> Joints:
             )
         else:
             unknown.append(f"{constraint.kind} ({constraint.place.at})")
-    for card in deck.named("CONTACT"):
-        if (
-            card.name.startswith(("CONTACT_TIED", "CONTACT_SPOTWELD"))
-            or "TIEBREAK" in card.name
-        ):
-            tie = _read_tied_contact(deck, card)
-            joints += [tie] if tie else []
-            unknown += [] if tie else [_describe_card(card)]
+    for card, tie in read_tied_contacts(deck):
+        joints += [tie] if tie else []
+        unknown += [] if tie else [_describe_card(card)]
     return Joints(tuple(joints), tuple(unknown))
+
+
+def read_tied_contacts(deck: Deck) -> Iterator[tuple[Card, Joint | None]]:
+    """Yield each tied contact with its joint between two parts, or between nodes and a part; None if it is unknown."""
+    for card in find_tied_contacts(deck):
+        yield card, _read_tied_contact(deck, card)
+
+
+def _find_contact_line(card: Card) -> Row | None:
+    """Return the line of a contact that names its two sides; None if the card is incomplete.
+
+    An id or title and, with the option MPP, one or two further lines precede it. The second of these begins with ``&``.
+    """
+    options = card.options("CONTACT")
+    has_title = bool({"ID", "TITLE"} & options)
+    if "MPP" not in options:
+        return next(iter(card.lines[int(has_title) :]), None)
+    # The first line of the option MPP may be blank.
+    rows = card.rows[int(has_title) + 1 :]
+    return next((row for row in rows if not row.text.lstrip().startswith("&")), None)
 
 
 def _read_tied_contact(deck: Deck, card: Card) -> Joint | None:
     """Return the joint that a tied contact makes between two parts, or between nodes and a part; otherwise None."""
-    options = card.options("CONTACT")
-    rows = card.lines[int(bool({"ID", "TITLE"} & options)) :]
-    if not rows or "MPP" in options:
+    row = _find_contact_line(card)
+    if row is None:
         return None
-    values = card.numbers(rows[0], CONTACT)
+    values = card.numbers(row, CONTACT)
     if any(value.problem for value in values):
         return None
     first_id, second_id, kind, main = (value.value for value in values)

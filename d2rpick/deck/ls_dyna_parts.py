@@ -438,6 +438,16 @@ def find_element_cards(deck: Deck, *, searched: bool) -> list[Card]:
     ]
 
 
+def find_tied_contacts(deck: Deck) -> list[Card]:
+    """Return the cards of tied contacts, which join parts."""
+    return [
+        card
+        for card in deck.named("CONTACT")
+        if card.name.startswith(("CONTACT_TIED", "CONTACT_SPOTWELD"))
+        or "TIEBREAK" in card.name
+    ]
+
+
 Kind = Literal[
     "nodal rigid body",
     "extra nodes",

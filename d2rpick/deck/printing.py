@@ -57,8 +57,14 @@ _CODES: Final = {"INTER": (2, 4), "RWALL": (1, 3)}
 _OF_OFFSET: Final = "OFFSET was not tested with the solver: it should exceed the thickness of the contact."
 _LEFT_ACTIVE = (
     "Nodal rigid bodies, spotwelds and rigid walls on these parts stay active. If",
-    "  none also joins an unswitched part, set NRBF, NCSF 1 (delete) on the first",
-    "  card and 2 (activate) on the second. End the window before a wall (RWF 0).",
+    "  each of these bodies and spotwelds lies only on switched parts, set NRBF and",
+    "  NCSF to 1 (delete) on the first card and to 2 (activate) on the second. The",
+    "  window must end before the parts touch a rigid wall (RWF 0).",
+)
+_FAILED_JOINTS = (
+    "Merged parts stay one rigid body even if the welds or ties that connect them",
+    "  have failed before the first switch: look for such failures in the reference",
+    "  run, and keep parts that came loose deformable.",
 )
 _NODAL_BODIES_DELETED = (
     "Nodal rigid bodies and generalized welds of the deck, which all lie on these",
@@ -273,6 +279,8 @@ def _write_warnings(ids: Sequence[int], printing: Printing) -> Iterator[str]:
             for body in printing.bodies
             if len(body) > 1
         )
+        if any(len(body) > 1 for body in printing.bodies):
+            yield from _FAILED_JOINTS
     elif printing.merge is None and len(ids) > 1:
         yield from _SEPARATE
     elif printing.merge is not None and printing.merge not in ids:

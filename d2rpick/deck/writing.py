@@ -130,8 +130,33 @@ def write_deck(
     return [str(target / name) for name in files]
 
 
-def _write_ls_dyna(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
-    """Yield name and content of each file of an LS-DYNA deck that contains the cards."""
+def write_trial_deck(main: str, card: PrintedCard, folder: str) -> str:
+    """Write a deck with printed cards below an empty folder, in order to check it; return the path of its main deck.
+
+    Unlike `write_deck`, this also copies the files that the deck includes by relative paths from outside its folder.
+    The folders of all copies are related as those of the originals, so the solver would find them.
+
+    Raises
+    ------
+    DeckError
+        As for `write_deck`, except for these files.
+    """
+    writing = _write_radioss if list_run_files(main) else _write_ls_dyna
+    files = dict(writing(main, card, is_trial=True))
+    home = os.path.abspath(Path(main).parent)  # noqa: PTH100  resolve() would follow links out of the folder
+    places = [os.path.normpath(f"{home}/{name}") for name in files]
+    root = os.path.commonpath([home, *map(os.path.dirname, places)])
+    targets = [Path(folder, os.path.relpath(place, root)) for place in places]
+    for target, content in zip(targets, files.values(), strict=True):
+        target.parent.mkdir(parents=True, exist_ok=True)
+        write_as_a_whole(target, content)
+    return str(targets[0])
+
+
+def _write_ls_dyna(
+    main: str, card: PrintedCard, *, is_trial: bool = False
+) -> Iterator[tuple[str, bytes]]:
+    """Yield name and content of each file of an LS-DYNA deck that contains the cards; see `copy_files` for a trial."""
     deck = read_deck(main)
     source = SourceFile("the card", card.text.encode())
     if (
@@ -157,7 +182,8 @@ def _write_ls_dyna(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
         insert_cards(deck.sources[0], f"*INCLUDE\n{name}\n", deck.sources[0].blocks()),
     )
     yield name, text.encode()
-    yield from copy_files(deck.sources[1:], main, {name, Path(main).name})
+    taken = {name, Path(main).name}
+    yield from copy_files(deck.sources[1:], main, taken, is_trial=is_trial)
 
 
 def _keep_standard_format(cards: str) -> str:
@@ -204,26 +230,33 @@ def insert_cards(main: SourceFile, text: str, file_blocks: Iterable[Block]) -> b
 
 
 def copy_files(
-    files: Sequence[SourceFile], main: str, taken: set[str]
+    files: Sequence[SourceFile], main: str, taken: set[str], *, is_trial: bool = False
 ) -> Iterator[tuple[str, bytes]]:
-    """Yield the name and content of the files in and below the deck folder; other files need an absolute path."""
+    """Yield the name and content of the files in and below the deck folder; other files need an absolute path.
+
+    In a trial (``is_trial``), files outside of the folder that have a relative path are copied too.
+    """
     base = os.path.abspath(Path(main).parent)  # noqa: PTH100  resolve() would follow links out of the folder
     for file, source in {source.name: source for source in files}.items():
         relative = os.path.relpath(os.path.abspath(file), base)  # noqa: PTH100  resolve() would follow links out of the folder
-        if not relative.startswith(os.pardir):
+        is_absolute = os.path.normpath(file) == file and Path(file).is_absolute()
+        is_inside = not relative.startswith(os.pardir)
+        if is_inside or (is_trial and not is_absolute):
             if relative in taken:
                 raise DeckError(
                     f"{file}: the deck includes a file with the name of the card file, {relative!r}; rename it"
                 )
             yield relative, source.read(0)
-        elif os.path.normpath(file) != file or not Path(file).is_absolute():
+        elif not is_absolute:
             raise DeckError(
                 f"{file}: the deck includes it by a relative path from outside its folder; copy it into the folder"
             )
 
 
-def _write_radioss(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
-    """Yield the name and content of each file of a Radioss run with cards."""
+def _write_radioss(
+    main: str, card: PrintedCard, *, is_trial: bool = False
+) -> Iterator[tuple[str, bytes]]:
+    """Yield the name and content of each file of a Radioss run with cards; see `copy_files` for a trial."""
     run = read_run(main)
     printed = _read_printed_legs(main, card)
     starter_deck = _require_starter(main, run)
@@ -250,7 +283,8 @@ def _write_radioss(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
         engine_text = text + "".join(f"{line}\n" for line in lines)
         repeated_blocks = _read_repeated_blocks(leg, printed_leg)
         yield name, engine_text.encode() + repeated_blocks
-    for name, content in copy_files(starter_deck.sources[1:], starter, names):
+    includes = starter_deck.sources[1:]
+    for name, content in copy_files(includes, starter, names, is_trial=is_trial):
         yield name, _edit_file(name, content, card.sensors, left_out)
 
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from itertools import compress
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.base.errors import FormatError, give_if_written
+from d2rpick.base.errors import give_if_written
 from d2rpick.histories.formats import READERS
 from d2rpick.histories.history import Balance, Momenta, Samples
 from d2rpick.histories.meaning import (
@@ -264,13 +265,10 @@ def _read_hourglass_energies(
     """Return the highest hourglass energy and the highest internal energy of each part for which both are written."""
     ids = [part.id for part in parts]
     for database in databases:
-        try:
-            hourglass, internal = (
-                database.part_channel(name, ids)
-                for name in ("hourglass_energy", "internal_energy")
-            )
-        except FormatError:
+        energies = give_if_written(partial(_read_both_energies, database, ids))
+        if energies is None:
             continue
+        hourglass, internal = energies
         until_then = database.part_time <= until
         highest = (
             energy[until_then].max(axis=0, initial=0.0).tolist()
@@ -278,6 +276,14 @@ def _read_hourglass_energies(
         )
         return tuple(zip(parts, *highest, strict=True))
     return ()
+
+
+def _read_both_energies(database: Legs, ids: Sequence[int]) -> tuple[Samples, Samples]:
+    """Return the hourglass energies and the internal energies of parts, each of shape (n, parts)."""
+    return (
+        database.part_channel("hourglass_energy", ids),
+        database.part_channel("internal_energy", ids),
+    )
 
 
 def find_spring_energy(database: Legs) -> tuple[str, Samples] | None:

@@ -15,6 +15,7 @@ import numpy as np
 
 from d2rpick.base.errors import FormatError
 from d2rpick.base.tuples import NamedTuple
+from d2rpick.histories.damaged_rows import refuse_damaged_rows
 from d2rpick.histories.samples import find_newest_states
 
 if TYPE_CHECKING:
@@ -27,14 +28,14 @@ if TYPE_CHECKING:
 _NUMBER: Final = rb"([-+]?\d*\.?\d+(?:[Ee][-+]?\d+)?)"
 _SIDE: Final = rb"(?mi)^ *(?:slave|master|surf[ _]?[ab]) +\d+ +time"
 # These patterns are compiled on first use to keep start-up fast.
-_CONTACT_LINE: Final = (
-    rb"(?mi)^ *(?:slave|master|surf[ _]?[ab]) +(\d+) +time *"
+_CONTACT_ROW: Final = (
+    rb" *(?:slave|master|surf[ _]?[ab]) +(\d+) +time *"
     + rb" +[xyz] *".join([_NUMBER] * 4)
     + rb"(?=[ \r\n])"
 )
 _WALL_HEAD: Final = rb"(?i)wall# +normal-force"
-_WALL_LINE: Final = (
-    rb"(?m)^ +" + rb" +".join([_NUMBER, rb"(\d+)", *[_NUMBER] * 4]) + rb"(?=[ \r\n])"
+_WALL_ROW: Final = (
+    rb" +" + rb" +".join([_NUMBER, rb"(\d+)", *[_NUMBER] * 4]) + rb"(?=[ \r\n])"
 )
 _LEGEND: Final = rb"(?m)^\{BEGIN LEGEND\}[ \r]*\n(?:.*\n)*?\{END LEGEND\}"
 _ENTRY: Final = rb"(?m)^ *(\d+)(?: +(\S[^\r\n]*))?\r?$"
@@ -85,12 +86,13 @@ def _join_legs(pieces: Sequence[ContactForce]) -> ContactForce:
 
 
 def _read_forces_of_file(source: Source) -> Iterator[ContactForce]:
-    """Yield the forces of one file; raise FormatError if there are none."""
+    """Yield the forces of one file; raise FormatError if there are none, DamageError if a line cannot be read."""
     # Imported here to keep start-up fast.
     from d2rpick.histories.contact_forces import ContactForce
 
     data = bytes(source.data)
     is_wall = re.search(_WALL_HEAD, data[:_HEAD]) is not None
+    refuse_damaged_rows(source.name, data, _WALL_ROW if is_wall else _CONTACT_ROW)
     rows = _read_wall_rows(data) if is_wall else _read_contact_rows(data)
     if not rows.time.size:
         listed, name = ("rigid walls", "rwforc") if is_wall else ("contacts", "rcforc")
@@ -117,14 +119,14 @@ def _choose_largest_of_sides(time: Samples, forces: Samples) -> tuple[Samples, S
 
 def _read_contact_rows(data: bytes) -> _Rows:
     """Read the data lines of an rcforc."""
-    lines = np.array(re.findall(_CONTACT_LINE, data), dtype="S32")
+    lines = np.array(re.findall(rb"(?mi)^" + _CONTACT_ROW, data), dtype="S32")
     numbers = lines.astype(np.float64).reshape(-1, 5)
     return _Rows(numbers[:, 0], numbers[:, 1], numbers[:, 2:])
 
 
 def _read_wall_rows(data: bytes) -> _Rows:
     """Read the data lines of an rwforc. If they contain no components, the normal force is the first component."""
-    lines = np.array(re.findall(_WALL_LINE, data), dtype="S32")
+    lines = np.array(re.findall(rb"(?m)^" + _WALL_ROW, data), dtype="S32")
     numbers = lines.astype(np.float64).reshape(-1, 6)
     forces = numbers[:, 3:]
     without_components = ~forces.any(axis=1)

@@ -105,17 +105,34 @@ def find_ending(history: str) -> str | None:
     if history.endswith(".gz"):
         return _PACKED
     match = re.fullmatch(_HISTORY, history)
-    if match is None:
-        listings = [str(Path(history).parent / name) for name in ("messag", "d3hsp")]
-    elif Path(f"{match['root']}_{int(match['leg']) + 1:04d}.rad").exists():
+    if match and Path(f"{match['root']}_{int(match['leg']) + 1:04d}.rad").exists():
         return None
-    else:
+    endings = {ending for _, ending in _read_endings(history)}
+    return next((manner for manner in _ENDINGS.values() if manner in endings), None)
+
+
+def find_listing_with_error(histories: Sequence[str]) -> str | None:
+    """Return the listing next to the last history of a run that ended with an error; None if there is none."""
+    endings = _read_endings(max(histories))
+    return next(
+        (listing for listing, ending in endings if ending == WITH_AN_ERROR), None
+    )
+
+
+def _read_endings(history: str) -> Iterator[tuple[str, str]]:
+    """Yield the listings next to a history that report how the run ended, each with this ending."""
+    from pathlib import Path  # Imported here to keep start-up fast.
+
+    match = re.fullmatch(_HISTORY, history)
+    if match:
         listings = [f"{match['root']}_{int(match['leg']):04d}.out"]
-    tails = [read_tail(listing, _TAIL) for listing in listings]
-    for words, manner in _ENDINGS.items():
-        if any(words in tail and _STOPPED not in tail for tail in tails):
-            return manner
-    return None
+    else:
+        listings = [str(Path(history).parent / name) for name in ("messag", "d3hsp")]
+    for listing in listings:
+        tail = read_tail(listing, _TAIL)
+        for words, manner in _ENDINGS.items():
+            if words in tail and _STOPPED not in tail:
+                yield listing, manner
 
 
 def _read_ends(path: str) -> tuple[bytes, bytes]:

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.base.errors import FormatError, give_if_written
+from d2rpick.base.errors import DamageError, FormatError, give_if_written
+from d2rpick.histories.damaged_rows import refuse_damaged_rows
 from d2rpick.histories.history import NodeMotion
 from d2rpick.histories.samples import find_newest_states
 
@@ -28,7 +29,7 @@ _COLUMNS: Final = rb"nodal point +x-disp +y-disp +z-disp"
 _NUMBER: Final = rb"([-+]?\d+\.\d*(?:[Ee][-+]\d+)?)"
 # These patterns are compiled on first use to keep start-up fast.
 _TIME: Final = rb" *\d+ *\( *at time *" + _NUMBER + rb" *\)"
-_LINE: Final = rb"(?m)^ *(\d+) +" + rb" *".join([_NUMBER] * 3) + rb"(?=[-+ \r\n])"
+_ROW: Final = rb" *(\d+) +" + rb" *".join([_NUMBER] * 3) + rb"(?=[-+ \r\n])"
 
 
 def recognises(head: bytes) -> bool:
@@ -41,8 +42,7 @@ def find_motion(
 ) -> NodeMotion | None:
     """Return the motion of the ``wanted`` nodes from the first source that contains any of them.
 
-    The result is None if neither the databases nor the node listings of the run contain them, or if their records are
-    damaged.
+    The result is None if neither the databases nor the node listings of the run contain them.
     """
     for database in databases:
         motion = give_if_written(partial(_read_database, database, wanted))
@@ -69,7 +69,8 @@ def read_listed_nodes(
     Raises
     ------
     FormatError
-        If a file has no readable state, or if its states have different nodes.
+        If a file has no readable state. It is a DamageError if a line cannot be read, or if the states of a file have
+        different nodes.
     """
     pieces = [_read_file(source) for source in sources]
     pieces.sort(key=lambda piece: float(piece.time[0]))
@@ -89,7 +90,9 @@ def read_listed_nodes(
 
 def _read_file(source: Source) -> NodeMotion:
     """Read all nodes of one file."""
-    states = list(_read_states(bytes(source.data)))
+    data = bytes(source.data)
+    refuse_damaged_rows(source.name, data, _ROW)
+    states = list(_read_states(data))
     if len(states) > 1 and len(states[-1].ids) < len(states[0].ids):
         states.pop()
     if not states:
@@ -99,7 +102,7 @@ def _read_file(source: Source) -> NodeMotion:
     first = states[0]
     for state in states:
         if state.ids != first.ids:
-            raise FormatError(
+            raise DamageError(
                 f"{source.name}: at {state.time[0]:.6g} it has other nodes than at {first.time[0]:.6g}, so that their "
                 "motion is not known throughout; copy the file again"
             )
@@ -116,7 +119,9 @@ def _read_states(data: bytes) -> Iterator[NodeMotion]:
         time = re.match(_TIME, block)
         if time is None or re.search(_COLUMNS, block) is None:
             continue
-        lines = np.array(re.findall(_LINE, block), dtype="S32").reshape(-1, 4)
+        lines = np.array(re.findall(rb"(?m)^" + _ROW, block), dtype="S32").reshape(
+            -1, 4
+        )
         if lines.size:
             ids = tuple(lines[:, 0].astype(np.int64).tolist())
             moved = lines[:, 1:].astype(np.float64)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final, Protocol, cast
 
 import numpy as np
 
-from d2rpick.base.errors import FormatError, list_names
+from d2rpick.base.errors import DamageError, FormatError, list_names
 from d2rpick.histories.content import Scattered
 from d2rpick.histories.database import Database, Legs
 from d2rpick.histories.formats import FAMILIES, READERS
@@ -397,6 +397,8 @@ def _read_force_listings(
 
     try:
         return read_listed_forces(sources), ()
+    except DamageError:
+        raise
     except FormatError as error:
         return (), (f"{error}; it was not used",)
 

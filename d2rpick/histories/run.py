@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from itertools import compress
@@ -260,8 +259,9 @@ class OpenedRun:
 
     def _masses(self, momenta: Samples, holder: Legs) -> Samples | None:
         """Return the masses of all parts, shape (parts,), as written or from momenta (n, parts, 3) and velocities."""
-        with suppress(FormatError):
-            return _compute_median_of_nonzero(self._of_holder("mass", holder.parts))
+        written = give_if_written(lambda: self._of_holder("mass", holder.parts))
+        if written is not None:
+            return _compute_median_of_nonzero(written)
         axis = int(np.abs(momenta).sum(axis=(0, 1)).argmax())
         velocity = give_if_written(
             lambda: self._of_holder(_VELOCITIES[axis], holder.parts)
@@ -363,12 +363,12 @@ class OpenedRun:
             if not database.channels or not np.array_equal(database.time, time):
                 continue
             for quantity in QUANTITIES:
-                if quantity in database.quantities and quantity not in columns:
-                    with suppress(
-                        FormatError
-                    ):  # The quantity is missing in some states.
-                        name = database.quantities[quantity]
-                        columns[quantity] = database.channel(name)
+                name = database.quantities.get(quantity)
+                if name is None or quantity in columns:
+                    continue
+                values = give_if_written(partial(database.channel, name))
+                if values is not None:
+                    columns[quantity] = values
         return columns
 
     def centre(self, parts: Sequence[Part]) -> Track | None:

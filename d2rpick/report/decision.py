@@ -56,7 +56,9 @@ def list_statements(decision: Decision) -> Lines:
     vibration = decision.quality.vibration
     alone = decision.quality.alone
     worth = decision.quality.worth
-    raised = "" if alone.grade == vibration.grade else f", by itself {alone.grade}"
+    raised = ""
+    if alone.grade != vibration.grade:
+        raised = f" ({alone.grade} without regard to the next contact)"
     share = ""
     if worth:
         share = f"; the energy of its error is {_format_worth(worth)}"

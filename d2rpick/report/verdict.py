@@ -140,6 +140,9 @@ def list_next_step(
     elif answer.is_of_other_times:
         line = write_command(question, "verify", *_leave_out_times(question.times))
         step = f"compare the window of the switched run with {line}"
+    elif answer.is_incomplete:
+        line = write_command(question, "verify", *question.times)
+        step = f"finish the switched run, then compare it again with {line}"
     elif decision.verdict == DO_NOT_USE:
         if answer.switched and not answer.switched.objections:
             return add_step_to_copy(
@@ -214,6 +217,8 @@ def list_comparison(answer: PairVerdict) -> list[tuple[str, str]]:
     is_within = _contradicts_verdict(switched, answer.decision)
     if is_within:
         verdict = "within limits, although the pair was poor"
+    elif switched.is_incomplete:
+        verdict = "incomplete for the reason below; within limits so far"
     elif switched.objections and _are_values_within_limits(switched):
         verdict = (
             "failed for the reason below, although these values are within their limits"

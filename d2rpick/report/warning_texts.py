@@ -166,6 +166,12 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "does not use them.",
             "Use a reference run, in which no part is switched. For a switched run, use plan with --done.",
         ),
+        "switched-run-ended": Explanation(
+            "The switched run ended before the next contact, or its listing reports an error. The runs agree as far as "
+            "they were compared, but the comparison does not pass, because the rest of the switched run is missing.",
+            "Find the cause in the listing (messag and d3hsp of LS-DYNA, NAME_0001.out of Radioss), let the run "
+            "continue, and compare again. If files of later restart segments exist, name them too.",
+        ),
         "truncated-input": Explanation(
             "The file ends within a state, for example because the run was killed or is still running. d2rpick uses "
             "only the complete states.",

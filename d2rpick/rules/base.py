@@ -18,6 +18,7 @@ from d2rpick.deck.ls_dyna_parts import (
     Constraint,
     DeckParts,
     find_element_cards,
+    find_tied_contacts,
     read_constraints,
     read_parts,
     read_sections,
@@ -262,6 +263,70 @@ class Case:
 
         nodes = (constraint.nodes for constraint in self.constraints)
         return find_parts_of_nodes(cards, frozenset[int]().union(*nodes))
+
+    @cached_property
+    def ties(self) -> Sequence[tuple[Card, frozenset[int]]]:
+        """Return the tied contacts whose parts are known, each with these parts."""
+        if not find_tied_contacts(self.deck):
+            return ()
+        # Imported here to keep start-up fast.
+        from d2rpick.deck.ls_dyna_inventory import find_parts_of_nodes
+        from d2rpick.deck.ls_dyna_loads import read_tied_contacts
+
+        ties = [(card, joint) for card, joint in read_tied_contacts(self.deck) if joint]
+        nodes = {node for _, joint in ties for node in joint.nodes.tolist()}
+        cards = find_element_cards(self.deck, searched=True) if nodes else ()
+        parts_of_nodes = find_parts_of_nodes(cards, nodes) if cards else {}
+        return [
+            (
+                card,
+                joint.parts.union(
+                    *(parts_of_nodes.get(node, ()) for node in joint.nodes.tolist())
+                ),
+            )
+            for card, joint in ties
+        ]
+
+    @cached_property
+    def knows_all_connections(self) -> bool:
+        """Return True if all elements, constraints and tied contacts that may connect parts can be read."""
+        # Imported here to keep start-up fast.
+        from d2rpick.deck.ls_dyna_loads import read_joints
+
+        return (
+            self.knows_all_parts
+            and bool(find_element_cards(self.deck, searched=True))
+            and not find_element_cards(self.deck, searched=False)
+            and not read_joints(self.deck).unknown
+        )
+
+    def list_connected_parts(self, part: int) -> Iterable[int]:
+        """Return the parts that share nodes with a part, or that a constraint or a tied contact connects to it."""
+        return self._connected.get(part, set())
+
+    @cached_property
+    def _connected(self) -> Mapping[int, set[int]]:
+        """Return the connected parts, keyed by part id."""
+        # Imported here to keep start-up fast.
+        from d2rpick.deck.ls_dyna_inventory import find_shared_nodes
+
+        cards = find_element_cards(self.deck, searched=True)
+        every_part = {part: part for part in self.parts.material_by_part}
+        groups: list[Iterable[int]] = [*find_shared_nodes(cards, every_part)]
+        groups += [parts for _, parts in self.ties]
+        for constraint in self.constraints:
+            parts_of_nodes = (
+                self.parts_of_constrained_nodes.get(node, ())
+                for node in constraint.nodes
+            )
+            own = {constraint.part} if constraint.part else set[int]()
+            groups.append(own.union(*parts_of_nodes))
+        connected: dict[int, set[int]] = {}
+        for group in groups:
+            members = {*group}
+            for part in members:
+                connected.setdefault(part, set()).update(members)
+        return connected
 
     @cached_property
     def made_rigid(self) -> tuple[SwitchEvent, ...]:

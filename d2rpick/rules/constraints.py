@@ -1,4 +1,4 @@
-"""Define rules D2R112-113 and D2R120-122: constraints on the parts that a card makes rigid.
+"""Define rules D2R112-113 and D2R120-124: constraints on the parts that a card makes rigid.
 
 A node of a rigid body must not obey a second constraint, so constraints on a switched part have to be deleted while the
 part is rigid. Two flags of the cards do this, for all constraints of a kind.  Parts that only a deleted constraint
@@ -13,6 +13,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import choose_verb, name_units
+from d2rpick.base.graph import find_reachable
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.deck.ls_dyna_parts import DELETING_FLAGS, read_merged_bodies
 from d2rpick.rules.base import ERROR, WARNING, Case, PlacedMessage, group_values
@@ -25,12 +26,16 @@ from d2rpick.rules.rule import (
     set_failing,
     set_passing,
 )
-from d2rpick.rules.switched_parts import find_lead_parts
+from d2rpick.rules.switched_parts import (
+    are_rigid_together,
+    find_bodies_of_parts,
+    find_lead_parts,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping, Sequence
 
-    from d2rpick.deck.card import CardField
+    from d2rpick.deck.card import Card, CardField
     from d2rpick.deck.ls_dyna_parts import Constraint, Kind
     from d2rpick.deck.switching import SwitchSet
 
@@ -56,6 +61,16 @@ _HELD_JOINT: Final = _JOINT.replace(
     "3         3        50", "         99         6        50"
 )
 _JOINING_WELD: Final = _SPOTWELD.replace("99", " 6")
+_TIE: Final = (
+    "*CONTACT_TIED_NODES_TO_SURFACE\n         1         2         3         3\n"
+)
+_TIE_BY_PENALTY: Final = _TIE.replace("SURFACE", "SURFACE_OFFSET")
+_TIE_OF_MPP: Final = _TIE.replace("SURFACE\n", "SURFACE_MPP\n         1       200\n")
+_RIGID_PART: Final = (
+    "*PART\nframe\n         7         1         9\n"
+    "*MAT_RIGID\n         9    7.8E-9     210.0       0.3\n"
+)
+_TIE_TO_RIGID: Final = _TIE_BY_PENALTY.replace("         2 ", "         7 ")
 _MERGED: Final = "*CONSTRAINED_RIGID_BODIES\n         1         2\n"
 
 
@@ -433,3 +448,156 @@ def _check_merged_bodies(case: Case) -> Iterator[PlacedMessage]:
                 place,
                 f"{problem}, but this keyword merges only *MAT_RIGID parts; remove it, and merge by LRB on the card",
             )
+
+
+@set_passing(
+    lambda: [
+        PASS,
+        _make_joined_deck(_TIE_BY_PENALTY, "         0         0", "1"),
+        _make_joined_deck(
+            _TIE, "         0         0", "1", "         2         1      PART"
+        ),
+        _make_joined_deck(
+            _RIGID_PART + _TIE_TO_RIGID,
+            "         0         0",
+            "         1         7      PART",
+        ),
+    ]
+)
+@set_failing(
+    lambda: [
+        _make_joined_deck(_TIE, "         0         0", "1"),
+        _make_joined_deck(_TIE_OF_MPP, "         0         0", "1"),
+        _make_joined_deck(_TIE, "         0         0", "1", "2"),
+        _make_joined_deck(_RIGID_PART + _TIE_TO_RIGID, "         0         0", "1"),
+    ]
+)
+@make_rule_decorator(
+    "D2R123",
+    WARNING,
+    "a tied contact between a switched part and a part outside its rigid body",
+)
+def _check_tied_contacts(case: Case) -> Iterator[PlacedMessage]:
+    """The switching cards do not delete tied contacts. A tied contact without OFFSET is a constraint on nodes, and
+    rigid bodies cannot obey it, so the tied parts may separate while one of them is rigid. With OFFSET (but not
+    CONSTRAINED_OFFSET), the contact acts by a penalty force and may connect a rigid part to a deformable part. Between
+    two rigid bodies, such as a switched part and a part with *MAT_RIGID, they do not move as one body. Source: the
+    vendor's public manual on tied contacts. Not tested with the solver.
+
+    Fix: Switch both parts and merge them by LRB. If one of them has *MAT_RIGID, write its id as LRB of the other. If
+    one of them should stay deformable, add OFFSET to the contact, or keep both deformable.
+    """
+    first = {event.unit.id: event for event in reversed(case.made_rigid)}
+    if not first:
+        return
+    bodies = find_bodies_of_parts(case, first)
+    for card, parts in case.ties:
+        switched = sorted(parts & first.keys())
+        if not switched:
+            continue
+        deformable = sorted(parts - bodies.keys())
+        always_rigid = sorted(parts & bodies.keys() - first.keys())
+        is_one_body = len({bodies[part] for part in parts & bodies.keys()}) < 2
+        names = name_units(switched)
+        problem = f"this contact ties {names}, made rigid by a card, to"
+        if always_rigid and not is_one_body:
+            lead = always_rigid[0]
+            has = "has" if len(always_rigid) == 1 else "have"
+            problem += f" {name_units(always_rigid)}, which {has} *MAT_RIGID and cannot be switched"
+            yield (
+                card.here,
+                f"{problem}; write LRB {lead} on the line of {names}, or keep {names} deformable",
+            )
+        elif deformable and not _acts_by_penalty(card):
+            problem += (
+                f" {name_units(deformable)}, which {choose_verb(deformable)} not, and acts only between deformable "
+                "parts, so they may separate"
+            )
+            yield (
+                card.here,
+                f"{problem}; switch and merge both, or add OFFSET to the contact",
+            )
+        elif not is_one_body and are_rigid_together(
+            case, first[switched[0]].unit, first[switched[-1]].unit
+        ):
+            yield (
+                card.here,
+                f"this contact ties {names}, which become separate rigid bodies; merge them by LRB",
+            )
+
+
+_LOOSE_RIGID: Final = (
+    _MESH
+    + _RIGID_PART
+    + "*ELEMENT_SHELL\n       9       7      91      92      93      94\n"
+)
+
+
+@set_passing(
+    lambda: [
+        PASS,
+        *(
+            _make_joined_deck(
+                text, "         0         0", "         1         7      PART"
+            )
+            for text in (
+                _LOOSE_RIGID.replace("      91", "       4"),
+                _LOOSE_RIGID + _TIE_TO_RIGID,
+                _LOOSE_RIGID + _SET.replace("99", "91") + _BODY,
+                _LOOSE_RIGID + _EXTRA.replace("  8  ", "  7  "),
+            )
+        ),
+    ]
+)
+@set_failing(
+    lambda: [
+        _make_joined_deck(
+            _LOOSE_RIGID, "         0         0", "         1         7      PART"
+        )
+    ]
+)
+@make_rule_decorator(
+    "D2R124",
+    WARNING,
+    "a switched part merged into a *MAT_RIGID part that is not attached",
+)
+def _check_merged_into_loose_part(case: Case) -> Iterator[PlacedMessage]:
+    """LRB merges a switched part into a part with *MAT_RIGID: while it is rigid, both move as one body. Elements,
+    constraints and tied contacts of the deck do not connect these parts, directly or by other parts, so they move
+    separately in the reference run. A flying part that is merged into a rigid ground does not fly. d2rpick does not
+    apply this rule if it cannot read some of the elements or ties.
+
+    Fix: Correct LRB (`--merge` of the card): name the *MAT_RIGID part to which the switched parts are attached, or one
+    of the switched parts.
+    """
+    first = {event.unit.id: event for event in reversed(case.made_rigid)}
+    bodies = find_bodies_of_parts(case, first) if first else {}
+    merged = group_values(
+        (bodies[part], part)
+        for part in sorted(first)
+        if any(bodies[part] == bodies[other] for other in bodies.keys() - first.keys())
+    )
+    if not merged or not case.knows_all_connections:
+        return
+    for body, parts in merged.items():
+        rigid = {part for part in bodies.keys() - first.keys() if bodies[part] == body}
+        connected: list[int] = find_reachable(parts, case.list_connected_parts)
+        if rigid.intersection(connected):
+            continue
+        line = next((line for part in parts if (line := first[part].line).lead), None)
+        if line and line.lead:
+            names = name_units(parts)
+            problem = f"{names} merged into {name_units(rigid)} with *MAT_RIGID, but nothing in the deck connects them"
+            yield (
+                line.lead.field,
+                f"{problem}, so they would move as one body only while {names} {choose_verb(parts)} rigid; correct LRB",
+            )
+
+
+def _acts_by_penalty(card: Card) -> bool:
+    """Return True if a tied contact acts by penalty forces, which may also connect a rigid part."""
+    options = card.options("CONTACT")
+    return ("OFFSET" in options and "CONSTRAINED" not in options) or {
+        "AUTOMATIC",
+        "TIEBREAK",
+    } <= options

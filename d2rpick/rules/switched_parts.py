@@ -337,11 +337,7 @@ def _check_shared_nodes(case: Case) -> Iterator[PlacedMessage]:
     first = {event.unit.id: event for event in reversed(case.made_rigid)}
     if not first:
         return
-    always_rigid = _find_always_rigid_bodies(case)
-    bodies = always_rigid | {
-        part: always_rigid.get(lead, lead)
-        for part, lead in find_lead_parts(first).items()
-    }
+    bodies = find_bodies_of_parts(case, first)
     cards = find_element_cards(case.deck, searched=True)
     if len(set(bodies.values())) < 2 or not cards:
         return
@@ -357,7 +353,7 @@ def _check_shared_nodes(case: Case) -> Iterator[PlacedMessage]:
             problem = f"part {part} becomes rigid and shares node {node} with part {lead}, which has *MAT_RIGID"
             cure = f"merge it into that part (LRB {lead} on its line), or keep part {part} deformable"
             yield (line.lead or line.part).field, f"{problem}; {cure}"
-        elif switched and _is_rigid_together(case, first[low].unit, first[high].unit):
+        elif switched and are_rigid_together(case, first[low].unit, first[high].unit):
             field = (first[high].line.lead or first[high].line.part).field
             lines = ((part, first[part].line) for part in (low, high))
             low_name, high_name = (
@@ -366,6 +362,17 @@ def _check_shared_nodes(case: Case) -> Iterator[PlacedMessage]:
             )
             problem = f"{low_name} and {high_name} share node {node} but become separate rigid bodies that both own it"
             yield field, f"{problem}; merge them: LRB {low} on the line of {high_name}"
+
+
+def find_bodies_of_parts(
+    case: Case, first: Mapping[int, SwitchEvent]
+) -> dict[int, int]:
+    """Return the rigid body of each part in ``first`` and of each part with *MAT_RIGID, by part id."""
+    always_rigid = _find_always_rigid_bodies(case)
+    return always_rigid | {
+        part: always_rigid.get(lead, lead)
+        for part, lead in find_lead_parts(first).items()
+    }
 
 
 def _find_always_rigid_bodies(case: Case) -> dict[int, int]:
@@ -401,7 +408,7 @@ def find_lead_parts(first: Mapping[int, SwitchEvent]) -> dict[int, int]:
     return {part: find_reachable([part], find_lead)[-1] for part in first}
 
 
-def _is_rigid_together(case: Case, first: Unit, second: Unit) -> bool:
+def are_rigid_together(case: Case, first: Unit, second: Unit) -> bool:
     """Return True if two parts or sets may be rigid at the same time; this is assumed if a force switches them."""
     if {first, second} & case.windows.other_rigid:
         return True

@@ -29,6 +29,7 @@ from d2rpick.choice.switched.switched_run import (
     prepare_switched_history,
 )
 from d2rpick.histories.history import History, Samples, Track
+from d2rpick.histories.listings import find_listing_with_error
 from d2rpick.histories.opening import OpenedRun, Selection, open_run
 from tests.command import (
     BOX,
@@ -521,6 +522,97 @@ def test_a_switched_run_that_lacks_a_part_that_flies_has_no_momentum_to_compare(
     comparison = verify_switched(replayed("reference"), switched, "--part", "3")
     assert comparison["switched"]["momentum_error"] is None
     assert comparison["verified"]
+
+
+# A switched run that ended early.
+
+ERRORS = {
+    "d3hsp": "\n E r r o r   t e r m i n a t i o n                 01/01/2026\n",
+    "messag": "\n E r r o r   t e r m i n a t i o n\n",
+}
+NORMAL = "\n N o r m a l    t e r m i n a t i o n                 01/01/2026\n"
+
+
+def cut_after(end: float) -> Callable[[str], str]:
+    """Return a function that removes the states of a matsum after a time."""
+
+    def cut(text: str) -> str:
+        head, *states = text.split("\n time =")
+        kept = [state for state in states if float(state.split()[0]) <= end]
+        return "\n time =".join([head, *kept])
+
+    return cut
+
+
+def verify_cut_run(
+    replayed: Callable[..., str], end: float, *options: str
+) -> tuple[int, str, str]:
+    """Return the exit code, the answer and the messages for a switched run that ends at a time."""
+    reference = replayed("reference")
+    switched = replayed("switched", *SWITCHES, change=cut_after(end))
+    arguments = ("--part", "3", reference, "--switched", switched, *options)
+    answer = run("verify", *arguments)
+    return answer.exit_code, answer.stdout, answer.stderr
+
+
+def test_a_switched_run_that_ended_before_the_contact_does_not_pass(
+    replayed: Callable[..., str],
+) -> None:
+    """Before, the comparison of what there was passed, with exit code 0."""
+    for options, name in (
+        ((), "the end of the reference run at 0.15"),
+        (("--landing", "0.12"), "the next contact at 0.12"),
+    ):
+        code, answer, messages = verify_cut_run(replayed, 0.1, *options)
+        ended = f"the switched run ended at 0.1, before {name}"
+        assert code == 1
+        assert f"warning: switched-run-ended: {ended}" in join_wrapped_lines(messages)
+        assert "the comparison with the switched run is incomplete" in messages
+        assert "incomplete for the reason below; within limits so far" in answer
+        assert "finish the switched run" in answer
+        assert "passed" not in answer
+        failed = verify_switched(
+            replayed("reference"),
+            replayed("switched", *SWITCHES, change=cut_after(0.1)),
+            *("--part", "3", *options),
+        )
+        assert failed["switched"]["objections"] == [ended]
+        assert failed["verified"] is False
+
+
+def test_a_switched_run_that_ended_after_the_contact_passes(
+    replayed: Callable[..., str],
+) -> None:
+    code, answer, _ = verify_cut_run(replayed, 0.1, "--landing", "0.09")
+    assert code == 0
+    assert "passed" in answer
+
+
+@pytest.mark.parametrize("listing", ERRORS)
+def test_a_switched_run_that_ended_with_an_error_does_not_pass(
+    listing: str, tmp_path: Path, replayed: Callable[..., str]
+) -> None:
+    (tmp_path / listing).write_text(NORMAL)
+    assert verify_cut_run(replayed, 0.15)[0] == 0
+    (tmp_path / listing).write_text(ERRORS[listing])
+    for end in (0.1, 0.15):
+        code, answer, messages = verify_cut_run(replayed, end)
+        assert code == 1
+        assert f"the switched run ended with an error at {end:g}" in answer
+        assert f"{tmp_path / listing}" in join_wrapped_lines(messages)
+
+
+def test_the_listing_of_radioss_shows_that_a_switched_run_ended_with_an_error(
+    tmp_path: Path,
+) -> None:
+    histories = [str(tmp_path / f"runT{leg:02d}") for leg in (1, 2, 3)]
+    (tmp_path / "run_0001.out").write_text("     ERROR TERMINATION\n")
+    (tmp_path / "run_0003.out").write_text("     NORMAL TERMINATION\n")
+    # The first engine run was repeated from its last restart file.
+    assert find_listing_with_error(histories) is None
+    listing = put(tmp_path / "run_0003.out", "     ERROR TERMINATION\n")
+    for names in (histories, [f"{name}.gz" for name in histories]):
+        assert find_listing_with_error(names) == str(listing)
 
 
 # The comparison itself.

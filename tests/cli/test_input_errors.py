@@ -33,7 +33,7 @@ COMMANDS: Final = {
     "were written by different solvers": ("plan", MATSUM, BOX),
     "main decks (...); name the deck of the run with --deck": ("plan", "decks"),
     "a number was expected; repair or delete the line": ("suggest", "word.csv"),
-    "is missing, cut or doubled in the state that begins here": ("plan", "cut.matsum"),
+    "is missing, cut or doubled in this state": ("plan", "cut.matsum"),
     "damaged gzip data": ("plan", "damaged.gz"),
     "it is damaged or cut, copy it again": ("plan", "damaged.h5"),
     "at least 3 were expected; write the energies more often": ("suggest", "short.csv"),

@@ -237,3 +237,29 @@ def test_a_card_of_radioss_is_clean_in_its_run(name: str, tmp_path: Path) -> Non
     run_result = run("check", "--fail-on", "warning", str(main)).stdout
     assert "parts 1, 2: rigid from 0.1 to 0.37" in run_result
     assert "0 errors, 0 warnings" in run_result, run_result
+
+
+@pytest.mark.parametrize("keyword", ["*INCLUDE\n", "*INCLUDE_PATH_RELATIVE\n"])
+def test_a_card_fits_into_a_deck_with_an_include_outside_its_folder(
+    keyword: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Before, the warning card-error and exit code 1 followed, although the card was right."""
+    folder = tmp_path / "run"
+    common = tmp_path / "common"
+    folder.mkdir()
+    common.mkdir()
+    main = write_box(folder)
+    put(common / "mesh.k", main.read_text("utf-8"))
+    include = "../common/mesh.k\n"
+    if "PATH" in keyword:
+        include = "../common\n*INCLUDE\nmesh.k\n"
+    put(main, f"*KEYWORD\n{keyword}{include}*END\n")
+    for deck in (str(main), "main.k"):
+        monkeypatch.chdir(folder)
+        arguments = ("plan", *FLYING, "--deck", deck, "-f", "card", "-o", "switches.k")
+        printed = run(*arguments, "--overwrite", str(folder / "matsum"))
+        assert printed.exit_code == 0, printed.stderr
+        assert "card-error" not in printed.stderr
+        assert "print the card again" not in printed.stderr
+    put(main, f"*KEYWORD\n{keyword}{include}*INCLUDE\nswitches.k\n*END\n")
+    assert run("check", str(main)).exit_code == 0

@@ -33,6 +33,13 @@ JOINTS = {
     "tied contact of an id": "*CONTACT_TIED_NODES_TO_SURFACE_ID\n"
     + pad(1)
     + pad(7, 9, 3, 3),
+    "tied contact of MPP": "*CONTACT_TIED_SURFACE_TO_SURFACE_OFFSET_ID_MPP\n"
+    + pad(1)
+    + pad(0, 200)
+    + "&        0         1\n"
+    + pad(7, 9, 3, 3),
+    "tied contact of MPP with a blank line": "*CONTACT_TIED_NODES_TO_SURFACE_MPP\n\n"
+    + pad(7, 9, 3, 3),
     "tied contact of nodes": SET + "*CONTACT_TIED_NODES_TO_SURFACE\n" + pad(5, 9, 4, 3),
 }
 
@@ -95,10 +102,6 @@ def test_several_welds_on_the_lines_of_a_keyword_join_a_chain(tmp_path: Path) ->
         (
             "*CONTACT_AUTOMATIC_SURFACE_TO_SURFACE_TIEBREAK\n" + pad(1, 2, 2, 2),
             "TIEBREAK",
-        ),
-        (
-            "*CONTACT_TIED_NODES_TO_SURFACE_MPP\n" + pad(0) + pad(7, 9, 3, 3),
-            "MPP",
         ),
         (
             "*CONSTRAINED_NODAL_RIGID_BODY\n" + pad(1, 0, 77),

@@ -254,10 +254,26 @@ def test_warnings_are_those_that_apply() -> None:
 
 def test_the_comments_ask_only_for_flags_that_the_constraints_allow() -> None:
     comments = join_comments(print_cards(ONE, MERGED).text)
+    assert "lies only on switched parts, set NRBF and NCSF to 1 (delete)" in comments
     assert (
-        "If none also joins an unswitched part, set NRBF, NCSF 1 (delete)" in comments
+        "The window must end before the parts touch a rigid wall (RWF 0)." in comments
     )
-    assert "End the window before a wall (RWF 0)." in comments
+    assert "welds or ties" not in comments
+
+
+def test_the_comments_state_that_failed_welds_still_merge_parts() -> None:
+    """Before, nothing stated that parts stay merged whose welds fail before the switch."""
+    for bodies, is_stated in (
+        ((), False),
+        (((11,), (12,)), False),
+        (((11, 12),), True),
+    ):
+        printing = Printing(part=(11, 12), bodies=bodies)
+        comments = join_comments(print_cards(ONE, printing).text)
+        stated = (
+            "Merged parts stay one rigid body even if the welds or ties" in comments
+        )
+        assert stated == is_stated
 
 
 def test_the_comments_allow_to_plan_later_flights_from_a_switched_run() -> None:

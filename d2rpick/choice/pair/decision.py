@@ -47,6 +47,11 @@ CHECK_SWITCHED_RUN: Final = (
 COMPARE_OTHER_WINDOW: Final = (
     "leave out `tr` and `td` to compare the window in which the switched run was rigid"
 )
+# FINISH_SWITCHED_RUN: advice if the switched run ended before the next contact, or with an error.
+FINISH_SWITCHED_RUN: Final = (
+    "let the switched run continue to the next contact, or add the files of its later restart segments, and compare "
+    "again"
+)
 # GIVE_SWITCHED_RUN_OF_MODEL: advice if the switched run differs from the reference run before the switch.
 GIVE_SWITCHED_RUN_OF_MODEL: Final = (
     "give the switched run of this model, with the same loads and velocities"

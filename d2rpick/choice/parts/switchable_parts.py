@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from d2rpick.base.errors import FormatError, give_if_written, name_units
+from d2rpick.base.errors import DamageError, FormatError, give_if_written, name_units
 from d2rpick.choice.td.flights import find_flights
 from d2rpick.deck.geometry import compute_masses_and_steps
 from d2rpick.deck.model import DISCRETE, Inventory, PartData
@@ -114,6 +114,8 @@ def collect_facts(run: OpenedRun, settings: Settings) -> RunFacts:
     masses = _read_masses(run)
     try:
         history, members = _read_energy_of_flight(run)
+    except DamageError:
+        raise
     except FormatError as error:  # The error is raised if no part ever deforms.
         still = {
             part.id: PartFacts(part, masses.get(part.id), has_energy=False)

@@ -7,15 +7,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from d2rpick.base.errors import Caution
 from d2rpick.choice.health import warn_about_engine
+from d2rpick.choice.pair.decision import FINISH_SWITCHED_RUN
 from d2rpick.choice.switched.comparison import compare_with_reference
 from d2rpick.choice.switched.switch_times import sort_windows
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from d2rpick.choice.answers import PairVerdict
     from d2rpick.choice.question import Reference
+    from d2rpick.choice.switched.comparison import Comparison
     from d2rpick.choice.switched.switch_times import SwitchedWindow
     from d2rpick.histories.history import History
 
@@ -63,8 +66,22 @@ def add_comparison(
         # If the switched run deviates too much, the pair is inadmissible, whatever the reference run shows.
         admissible=verdict.admissible and not comparison.objections,
         reasons=reasons,
-        cautions=(*verdict.cautions, *warn_about_engine(switched.run.sources)),
+        cautions=(
+            *verdict.cautions,
+            *warn_about_engine(switched.run.sources),
+            *_warn_about_end(comparison),
+        ),
     )
+
+
+def _warn_about_end(comparison: Comparison) -> Iterator[Caution]:
+    """Yield a warning if the switched run agrees with the reference run, but ended too early or with an error."""
+    if comparison.is_incomplete:
+        yield Caution(
+            "switched-run-ended",
+            f"{comparison.objections[-1]}; the comparison is within its limits up to {comparison.end:.6g}, but shows "
+            f"nothing after this time; {FINISH_SWITCHED_RUN}",
+        )
 
 
 def _find_output_interval(history: History, time: float) -> float:

@@ -45,6 +45,8 @@ _REPORTED_OFF = 0.01
 _STILL, _STILL_OF_VIBRATION = 1e-4, 1e-2
 # Relative tolerance for the energy near tr [-], because the solver may switch a state or two after the output.
 _ABOUT = 0.05
+# Number of output intervals by which a finished run may end before the time that it should reach.
+_STATES_AT_END: Final = 2
 # Number of states before a rigid window in which the runs are compared if there are earlier windows.
 _STATES_BEFORE: Final = 2 * FEWEST
 # The windows of a switched run of which only the energy is known.
@@ -54,11 +56,12 @@ _UNKNOWN_WINDOWS: Final = SwitchedWindows(None)
 class Comparison(NamedTuple):
     """Differences between a switched run and its reference run; unknown quantities are None.
 
-    The fields are the keys of the JSON output, except the last five: ``min_mean`` is the smallest expected ratio of
+    The fields are the keys of the JSON output, except the last six: ``min_mean`` is the smallest expected ratio of
     the means [-], ``has_energy`` is False if the energies after td are not compared, because they are only round-off or
     all wrong, ``misreported`` contains the names of the parts for which the solver reports a wrong energy after td,
-    ``is_of_other_run`` is True if the runs differ although neither was rigid yet, and ``is_of_other_times`` is True if
-    the switched run was rigid in another window.
+    ``is_of_other_run`` is True if the runs differ although neither was rigid yet, ``is_of_other_times`` is True if the
+    switched run was rigid in another window, and ``is_incomplete`` is True if the only objection is that the switched
+    run ended too early or with an error.
 
     ``energy_frozen`` is the energy of the switched run at td, ``energy_td`` that of the reference run. ``rigid_from``
     and ``rigid_to`` are the first and last states of the window around the middle of (tr, td) in which the energy of
@@ -92,6 +95,7 @@ class Comparison(NamedTuple):
     misreported: tuple[str, ...] = ()
     is_of_other_run: bool = False
     is_of_other_times: bool = False
+    is_incomplete: bool = False
 
 
 def compare_with_reference(
@@ -141,12 +145,57 @@ def compare_with_reference(
     objections = (*judged.objections, *comparison.objections)
     if comparison.is_of_other_run:
         objections = (*comparison.objections, *judged.objections)
+    early_end = explain_early_end(
+        switched, reference, _find_expected_end(situation, windows)
+    )
     return comparison._replace(
-        objections=objections,
+        objections=(*objections, *early_end),
+        is_incomplete=bool(early_end) and not objections,
         notes=(*judged.notes, *comparison.notes),
         other_windows=tuple((window.tr, window.td) for window in others),
         misreported=judged.misreported,
     )
+
+
+def _find_expected_end(
+    situation: Situation, windows: SwitchedWindows
+) -> tuple[float, str]:
+    """Return the time [time] that a switched run should reach, and its name: the next rigid window or contact."""
+    later = min((window.tr for window in windows.later), default=np.inf)
+    contact = situation.flight.end
+    if contact is None or contact <= situation.td:
+        contact = np.inf
+    if later < contact:
+        return later, "the next rigid window"
+    return contact, "the next contact"
+
+
+def explain_early_end(
+    switched: Reference, reference: Reference, expected: tuple[float, str]
+) -> tuple[str, ...]:
+    """Return the objection to a switched run that ended too early or with an error; empty if there is none.
+
+    ``expected`` is the time that the run should reach [time], and the name of this time; infinite if it is unknown.
+    The run need not continue beyond the end of the reference run.
+    """
+    # Imported here to keep start-up fast.
+    from d2rpick.histories.listings import find_listing_with_error
+
+    last = switched.history.end
+    time, name = expected
+    if time > reference.history.end:
+        time = reference.history.end
+        name = "the end of the reference run"
+    room = _STATES_AT_END * max(switched.history.step, reference.history.step)
+    before = f", before {name} at {time:.6g}" if last < time - room else ""
+    listing = find_listing_with_error(switched.run.sources)
+    if listing:
+        return (
+            f"the switched run ended with an error at {last:.6g}{before} ({listing})",
+        )
+    if before:
+        return (f"the switched run ended at {last:.6g}{before}",)
+    return ()
 
 
 def _read_momentum(run: OpenedRun, parts: Sequence[Part] | None) -> Track | None:

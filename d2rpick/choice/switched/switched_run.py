@@ -15,7 +15,6 @@ import numpy as np
 
 from d2rpick.base.errors import (
     Caution,
-    FormatError,
     RangeError,
     give_if_written,
     list_names,
@@ -548,19 +547,20 @@ def choose_same_parts(
         excluded.
     """
     as_read = SameParts(without.history, switched.history)
-    try:
-        parts = _select_deformable(without, switched.run.parts)
-        return (
-            _choose_compared_parts(without, switched, pair, parts) if parts else as_read
-        )
-    except FormatError:  # A quantity of a part is missing in some states.
-        return as_read
+    # The result is None if a quantity of a part is missing in some states.
+    same_parts = give_if_written(
+        lambda: _choose_compared_parts(without, switched, pair)
+    )
+    return same_parts or as_read
 
 
 def _choose_compared_parts(
-    without: Reference, switched: Reference, pair: Times, parts: tuple[Part, ...]
-) -> SameParts:
-    """Choose the parts to compare from ``parts``, with objections and notes."""
+    without: Reference, switched: Reference, pair: Times
+) -> SameParts | None:
+    """Choose the parts to compare, with objections and notes; None if no part can be compared."""
+    parts = _select_deformable(without, switched.run.parts)
+    if not parts:
+        return None
     history = without.history
     rigid = detect_rigid_parts(switched.run, parts, switched.run.part_time, *pair)
     only_some_rigid = rigid is not None and bool(rigid.any()) and not rigid.all()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from functools import partial
 from itertools import compress
 from typing import TYPE_CHECKING, Final
@@ -314,7 +315,8 @@ class Table(Database):
     @property
     def notes(self) -> tuple[str, ...]:  # type: ignore[override]  # a property overrides a field
         """Notes on assumptions and omissions, which are complete only after the required columns have been read."""
-        give_if_written(lambda: self.time)
+        with suppress(FormatError):
+            _ = self.time
         return tuple(self._notes)
 
     def _split_channels(self) -> tuple[tuple[str, ...], list[str]]:

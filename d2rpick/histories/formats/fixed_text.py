@@ -9,13 +9,14 @@ instance those of a part at rest); these are read only once.
 
 from __future__ import annotations
 
+import re
 from array import array
 from functools import lru_cache
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.base.errors import CHOOSE_FORMAT, FormatError
+from d2rpick.base.errors import CHOOSE_FORMAT, DamageError, FormatError
 from d2rpick.histories.content import count_line_number, make_content
 from d2rpick.histories.database import Database
 from d2rpick.histories.formats.blocks import (
@@ -27,6 +28,7 @@ from d2rpick.histories.formats.blocks import (
     parse_fortran_numbers,
     read_head_of_listing,
 )
+from d2rpick.histories.formats.header import quote_start
 from d2rpick.histories.resuming import ResumePoint
 
 if TYPE_CHECKING:
@@ -40,6 +42,8 @@ if TYPE_CHECKING:
     Fields = NDArray[np.bytes_]
 
 _RECENT: Final = 12  # Number of recent block layouts tried before parsing a block.
+# Pattern of a printed number, whatever precedes it.
+_PRINTED: Final = re.compile(rb"[ +-]*\d[\d.]*(?:[EeDd]?[+-]\d+)?(?=[ \t\r]|$)")
 # Largest length of the first line of a block [bytes].
 _LINE: Final = 1 << 10
 
@@ -253,7 +257,7 @@ class Blocks(Database):
         )
         text = self.text(address, self._grammar.width).decode("latin-1").strip()
         problem = f"{self.source}:{count_line_number(self._data, address)}: {_name_field(names[column])} is {text!r}"
-        raise FormatError(
+        raise DamageError(
             f"{problem}, but a number in its columns was expected; cut the file before this state"
         )
 
@@ -269,13 +273,58 @@ class Blocks(Database):
         """Return the offsets of the named numbers in equal blocks; raise FormatError if any of them is ambiguous."""
         layout = self.layout(run.example, run.stride)
         for name in names:
-            if layout.fields.get(name, UNSURE) == UNSURE:
-                line = count_line_number(self._data, run.start)
-                raise FormatError(
-                    f"{self.source}:{line}: {_name_field(name)} is missing, cut or doubled in "
-                    "the state that begins here, each state should have it once; leave it out or cut the file"
-                )
+            if not self._has(run, name):
+                raise self._explain_missing(run, name)
         return np.array([layout.fields[name] for name in names], dtype=np.int64)
+
+    def _has(self, run: Stretch, name: Hashable) -> bool:
+        """Return True if equal blocks contain the number ``name`` exactly once."""
+        return self.layout(run.example, run.stride).fields.get(name, UNSURE) != UNSURE
+
+    def _explain_missing(self, run: Stretch, name: Hashable) -> FormatError:
+        """Return the error for equal blocks without the number ``name``; a DamageError if their text is damaged.
+
+        A solver may begin or cease to write a number, for instance at a restart. The text is damaged if the number is
+        truncated or occurs twice, if it is missing between states that have it, or if its state has a line of a form
+        that a state with this number does not have.
+        """
+        with_it = [other for other in self if self._has(other, name)]
+        field = _name_field(name)
+        odd_line = self._find_odd_line(run, with_it[0]) if with_it else None
+        if odd_line is not None:
+            address, text = odd_line
+            line = count_line_number(self._data, address)
+            return DamageError(
+                f"{self.source}:{line}: {quote_start(text)} was found, but a line as in other states was expected, "
+                f"because {field} is missing, cut or doubled in this state; repair the line or cut the file"
+            )
+        is_between = bool(with_it) and with_it[0].start < run.start < with_it[-1].start
+        is_unsure = name in self.layout(run.example, run.stride).fields
+        line = count_line_number(self._data, run.start)
+        kind = DamageError if is_between or is_unsure else FormatError
+        return kind(
+            f"{self.source}:{line}: {field} is missing, cut or doubled in "
+            "the state that begins here, each state should have it once; leave it out or cut the file"
+        )
+
+    def _find_odd_line(self, run: Stretch, regular: Stretch) -> tuple[int, str] | None:
+        """Return the offset and text of the first line of a block whose form no line of a regular block has."""
+        usual = {
+            self._remove_numbers(line)
+            for line in self.text(regular.example, regular.stride).split(b"\n")
+        }
+        address = run.start
+        for line in self.text(run.start, run.stride).split(b"\n"):
+            if line.strip() and self._remove_numbers(line) not in usual:
+                return address, line.decode("latin-1").strip()
+            address += len(line) + 1
+        return None
+
+    def _remove_numbers(self, line: bytes) -> bytes:
+        """Return the form of a line: its text without blanks, numbers, and other text that may change."""
+        return self._grammar.changing.sub(b"", _PRINTED.sub(b"", line)).replace(
+            b" ", b""
+        )
 
     # The methods below find the blocks of the file.
 

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from d2rpick.base.errors import FormatError
+from d2rpick.base.errors import DamageError, FormatError
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.histories.formats.cells import is_skipped, split_cells
+from d2rpick.histories.formats.cells import is_missing, is_skipped, split_cells
 from d2rpick.histories.formats.header import quote_start
 from d2rpick.histories.formats.plain_rows import read_plain_rows
 from d2rpick.histories.meaning import is_time
@@ -254,9 +254,10 @@ def _split_row(where: str, row: str, layout: Layout) -> list[str]:
 
 
 def _parse_value(where: str, layout: Layout, column: int, cell: str) -> float:
-    """Return the finite number in a cell; raise FormatError for any other content."""
+    """Return the finite number in a cell; raise FormatError for a missing number, DamageError for other content."""
     value = layout.number(cell)
     if value is None or not np.isfinite(value):
         problem = f"{where}: {layout.name(column)!r} is {cell[:60]!r}, but a number was expected"
-        raise FormatError(f"{problem}; repair or delete the line")
+        kind = FormatError if is_missing(cell) else DamageError
+        raise kind(f"{problem}; repair or delete the line")
     return value
