@@ -109,6 +109,14 @@ def give_if_written(read: Callable[[], _Read]) -> _Read | None:
         return None
 
 
+def give_if_readable(read: Callable[[], _Read]) -> _Read | None:
+    """Return the result of ``read`` for a display; None if the files lack the data, or if the data are damaged."""
+    try:
+        return read()
+    except FormatError:
+        return None
+
+
 def format_in_one_line(error: BaseException) -> str:
     """Return any error as a one-line message; for an unforeseen error, ask the user to report it.
 

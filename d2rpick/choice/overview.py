@@ -14,6 +14,7 @@ from d2rpick.base.errors import (
     EnergyChoiceError,
     FormatError,
     RangeError,
+    give_if_readable,
     give_if_written,
     list_names,
 )
@@ -390,7 +391,7 @@ def _read_notes(database: Legs) -> tuple[str, ...]:
 def _list_part_overviews(run: OpenedRun) -> Iterator[PartOverview]:
     """Yield each part with its highest internal energy."""
     if run.parts:
-        energies = give_if_written(lambda: run.part_energies(run.parts))
+        energies = give_if_readable(lambda: run.part_energies(run.parts))
     else:
         energies = np.empty((0, 0))
     if energies is None:  # The energy of the part is missing in some states.
@@ -406,7 +407,7 @@ def _list_part_overviews(run: OpenedRun) -> Iterator[PartOverview]:
 
 def _find_highest_energy_of_part(run: OpenedRun, part: Part) -> float | None:
     """Return the highest internal energy of a part [energy]; None if the solver did not write it."""
-    return give_if_written(lambda: _find_maximum(run.part_energies([part])))
+    return give_if_readable(lambda: _find_maximum(run.part_energies([part])))
 
 
 def _find_maximum(energies: Samples) -> float | None:
@@ -433,9 +434,11 @@ def _assess_health_of_run(
     flights: Sequence[FreeFlight],
     rigid: Sequence[Times],
 ) -> Health | None:
-    """Return the health of the run outside its rigid windows; None if no energies were written."""
-    balance = read_balance(
-        run.databases, run.parts, known=history.balance if history else None
+    """Return the health of the run outside its rigid windows; None if no energies were written or they are damaged."""
+    known = history.balance if history else None
+    # If the energies are damaged, a warning says so.
+    balance = give_if_readable(
+        lambda: read_balance(run.databases, run.parts, known=known)
     )
     if balance is None or not balance.time.size:
         return None

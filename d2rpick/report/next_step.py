@@ -562,8 +562,9 @@ def name_step_after_card(
 def name_step_after_extract(file: str) -> str:
     """Return the next step after an energy was extracted into a file."""
     line = quote_shell_line(("d2rpick", "suggest", *make_positional([file])))
-    advice = "print the cards from the run itself, because the table names neither its solver nor all its parts"
-    return f"{advice}; choose times with {line}"
+    action = "choose times with this table, but print the cards from the run itself"
+    reason = "because the table names neither its solver nor all its parts"
+    return f"{action}, {reason}: {line}"
 
 
 def name_step_after_weights(file: str) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Final
 
-from d2rpick.base.errors import give_if_written
+from d2rpick.base.errors import give_if_readable
 from d2rpick.choice.pair.grades import POOR, VERDICTS
 from d2rpick.choice.runs.study import StudyOfRuns, format_number_of_runs
 from d2rpick.report import (
@@ -735,7 +735,7 @@ def give_sentence(kind: str, answer: Any) -> str:
 def summarise_files(run: OpenedRun) -> str:
     """Return a summary of a run's files, format, states, times and parts, as far as the files can be read."""
     first = run.databases[0]
-    time = give_if_written(lambda: first.time if first.channels else first.part_time)
+    time = give_if_readable(lambda: first.time if first.channels else first.part_time)
     facts = [" + ".join(database.format for database in run.databases)]
     if time is not None and time.size:
         facts += [

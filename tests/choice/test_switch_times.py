@@ -216,7 +216,10 @@ def test_an_unlike_run_is_the_first_reason_against_a_given_pair(tmp_path: Path) 
         in text
     )
     assert "to improve give the switched run of this model" in text
-    assert f"next look at both runs with d2rpick info {reference}" in text
+    assert (
+        f"next look at both runs, each with such a command: d2rpick info {reference}"
+        in text
+    )
 
 
 def make_history(energy: Samples) -> History:

@@ -64,8 +64,8 @@ def test_what_is_extracted_reads_back_bit_for_bit(
     result = run("extract", *options, source, "-o", str(file))
     assert (result.exit_code, result.stdout) == (0, "")
     assert result.stderr == (
-        f"next: choose times with d2rpick suggest {file}; print the cards from the run itself, because the table names "
-        "neither its solver nor all its parts\n"
+        "next: choose times with this table, but print the cards from the run itself, because the table names neither "
+        f"its solver nor all its parts: d2rpick suggest {file}\n"
     )
     again = read_history([str(file)])
     assert again.channel == "internal_energy"

@@ -222,7 +222,10 @@ def test_an_energy_of_zero_leads_to_the_choice_of_another_column(
     rows = "".join(f"{step / 100},0\n" for step in range(100))
     file = put(tmp_path / "zero.csv", f"time,internal_energy\n{rows}")
     answer = " ".join(run("suggest", "--td", "0.3", str(file)).stdout.split())
-    assert "next choose the internal energy as --energy; d2rpick info" in answer
+    assert (
+        "next choose the internal energy as --energy; see the columns with d2rpick info"
+        in answer
+    )
 
 
 def test_no_flight_is_assumed_across_a_missing_restart_segment() -> None:

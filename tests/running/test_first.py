@@ -60,7 +60,7 @@ def test_legs_end_by_sensors_of_flight_and_of_contact(tmp_path: Path) -> None:
     assert checked.exit_code == 0
     assert "switches itself by forces or sensors of the run" in checked.stdout
     assert "no switching cards" not in checked.stdout
-    assert f"d2rpick follow {tmp_path / 'next'} shows" in checked.stdout
+    assert f"d2rpick follow {tmp_path / 'next'}" in checked.stdout
     assert not any(
         "stays active" in note for note in prepared.notes
     )  # the body is deactivated, as in runs computed with OpenRadioss

@@ -303,8 +303,8 @@ class Blocks(Database):
         line = count_line_number(self._data, run.start)
         kind = DamageError if is_between or is_unsure else FormatError
         return kind(
-            f"{self.source}:{line}: {field} is missing, cut or doubled in "
-            "the state that begins here, each state should have it once; leave it out or cut the file"
+            f"{self.source}:{line}: {field} is missing, cut or doubled in the state that begins here, but each state "
+            "should contain it once; delete this state, or cut the file before it"
         )
 
     def _find_odd_line(self, run: Stretch, regular: Stretch) -> tuple[int, str] | None:
