@@ -302,9 +302,11 @@ def first(
 ) -> None:
     """Write a copy of DECK that switches the parts in its first run, so that no reference run is needed.
 
-    The solver makes the parts rigid when no contact force has acted for the time of --wait, and deformable at the next
-    force.  For Radioss, the copy contains the missing rigid bodies, and engine files with sensors that end the engine
-    runs.  For LS-DYNA, the copy contains switches with contact codes.
+    Radioss makes the parts rigid when no contact force has acted for the time of --wait, and deformable at the next
+    force.  The copy contains the missing rigid bodies, and engine files with sensors that end the engine runs.
+
+    LS-DYNA makes the parts rigid as soon as no force acts, and deformable at the next force.  They then stay deformable
+    for at least the time of --wait.  The copy contains switches with contact codes.
 
     Examples
     --------

@@ -8,11 +8,9 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import field
 from typing import TYPE_CHECKING, Any, Final, Generic, TypeVar
 
 from d2rpick.base.caching import cached_property
-from d2rpick.base.data_classes import dataclass
 from d2rpick.base.graph import find_reachable
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.deck.expression import (
@@ -187,15 +185,26 @@ class Transform(NamedTuple):
         )
 
 
-@dataclass(eq=False, repr=False)
+_UNCHANGED: Final = Transform()
+
+
 class Card:
     """A keyword block that d2rpick uses; ``name`` is the keyword in upper case, without ``*`` and format suffix."""
 
-    name: str
-    block: Block
-    scope: Scope
-    width: int = STANDARD
-    transform: Transform = field(default_factory=Transform)
+    # The initialiser of a data class would take longer, and a deck has many keywords.
+    def __init__(
+        self,
+        name: str,
+        block: Block,
+        scope: Scope,
+        width: int = STANDARD,
+        transform: Transform = _UNCHANGED,
+    ) -> None:
+        self.name = name
+        self.block = block
+        self.scope = scope
+        self.width = width
+        self.transform = transform
 
     @property
     def file(self) -> str:

@@ -76,11 +76,17 @@ def find_pair_timing(windows: Sequence[Times], pushes: Pushes) -> ForceTiming:
     rigid = ForceSwitch(True, False, windows[0][0], latest)
 
     def follow(wait: float) -> Sequence[tuple[float, float | None]]:
-        return follow_pair(
-            rigid, ForceSwitch(False, True, delay=wait), advanced, math.inf
-        )
+        # OFFSET belongs to the set that makes the parts deformable. The other set still sees no force at this time.
+        returns = ForceSwitch(False, True, delay=wait)
+        return follow_pair(rigid, returns, pushes.spans, math.inf, advanced)
 
     waits = [tr - td for (_, td), (tr, _) in itertools.pairwise(windows)]
+    # Until the middle of the next contact, so that the wait also suffices if this contact begins somewhat later.
+    waits += [
+        (start + end) / 2 - td
+        for (_, td), (start, end) in zip(windows, contacts_after, strict=True)
+        if start < math.inf and lead > 0
+    ]
     wait, switched = _find_least_wait(waits, windows, follow, "pair of switch sets")
     return ForceTiming(
         windows[0][0], latest, wait, lead * (pushes.speed or 0.0), switched

@@ -61,7 +61,7 @@ _OF_WALLS: Final = (
     " a momentum of 511 afterwards, a deformable body 365. d2rpick drive keeps a margin before the wall."
 )
 _OF_LS_DYNA: Final = (
-    "CODE 2 has no force-free time: after TIME1, zero force makes parts rigid, even between two pulses.",
+    "CODE 2 has no force-free time: after TIME1 and TIME3, zero force makes parts rigid, even between two pulses.",
     "These switches do not react to other contacts, rigid walls and loads.",
     "These cards were not tested with the solver.",
 )
@@ -110,8 +110,12 @@ class FirstRunDeck(NamedTuple):
     after: float | None
 
     def explain_wait(self) -> str:
-        """Return the note that states how long no force must act until a flight is detected, and why."""
-        return f"A flight is detected when no force has acted for {self.wait:.4g} ({self.reason})."
+        """Return the note that states what the waiting time means for the solver of the deck, and where it is from."""
+        if self.inventory.solver == "ls-dyna":
+            meaning = "After each switch to deformable, the parts stay deformable for at least"
+        else:
+            meaning = "A flight is detected when no force has acted for"
+        return f"{meaning} {self.wait:.4g} ({self.reason})."
 
     def falls_from_rest(self, *, starts_moving: bool) -> bool:
         """Return True if gravity acts and the parts do not start moving, so that they may be rigid from the start."""

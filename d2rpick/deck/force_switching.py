@@ -7,6 +7,7 @@ the one that has PAIRED 1. No set acts within TIME3 after the last switch. This 
 
 from __future__ import annotations
 
+import itertools
 import math
 from itertools import cycle
 from typing import TYPE_CHECKING, NamedTuple
@@ -81,8 +82,13 @@ def _follow_switches(
     second: tuple[ForceSwitch | None, Spans],
     end: float,
 ) -> Iterator[tuple[float, bool]]:
-    """Yield the times at which two sets switch in turn, each with True if the parts become rigid, else False."""
-    ready = 0.0
+    """Yield the times at which two sets switch in turn, each with True if the parts become rigid, else False.
+
+    While the conditions of both sets hold, the sets act again and again (chatter). Only the first two of these switches
+    are yielded; the next one follows when a force begins or ends.
+    """
+    changes = _list_changes(first, second)
+    last_time, ready = -math.inf, 0.0
     turns = cycle((first, second)) if first[0].paired else iter((first, second))
     for acting, contacts in turns:
         if acting is None:
@@ -94,6 +100,22 @@ def _follow_switches(
             return
         yield time, acting.to_rigid
         ready = max(time + acting.delay, math.nextafter(time, math.inf))
+        if not acting.to_rigid and not any(
+            last_time < change <= time for change in changes
+        ):
+            later = (change for change in changes if change > time)
+            ready = max(ready, min(later, default=math.inf))
+        last_time = time
+
+
+def _list_changes(*sets: tuple[ForceSwitch | None, Spans]) -> list[float]:
+    """Return the times at which the condition of one of the sets begins or ceases to hold."""
+    return [
+        time
+        for acting, contacts in sets
+        if acting is not None
+        for time in (acting.earliest, *itertools.chain(*contacts))
+    ]
 
 
 def _find_next_switch(with_force: bool, since: float, contacts: Spans) -> float:
@@ -113,21 +135,25 @@ def find_delay_without_chatter(
 ) -> float | None:
     """Return the smallest TIME3 of the releasing set with which the pair switches only in these windows.
 
-    Each contact before a window must end within this time. The result is None if no contact precedes any window.
+    TIME3 begins at the end of a window. It must last until the next contact begins, because the parts would otherwise
+    become rigid again before this contact, and until all contacts before the next window have ended. The result is None
+    if there is no contact before or after a window.
     """
-    contacts_before = [
-        [span for span in contacts if span[1] <= tr] for tr, _ in windows
-    ]
-    clusters = [_find_cluster(spans, windows) for spans in contacts_before if spans]
-    return max((end - start for start, end in clusters), default=None)
+    delays = [end - begin for begin, end in _list_pauses(windows, contacts)]
+    return max(delays, default=None)
 
 
-def _find_cluster(
-    contacts: Spans, windows: Sequence[tuple[float, float]]
-) -> tuple[float, float]:
-    """Return the time span from the first to the last contact after the end of the previous window."""
-    last_end = contacts[-1][1]
-    last_window_end = max(
-        (td for _, td in windows if td <= last_end), default=-math.inf
-    )
-    return min(start for start, end in contacts if end > last_window_end), last_end
+def _list_pauses(
+    windows: Sequence[tuple[float, float]], contacts: Spans
+) -> Iterator[tuple[float, float]]:
+    """Yield the time spans around the contacts in which the pair must not act."""
+    for tr, _ in windows:
+        earlier = [span for span in contacts if span[1] <= tr]
+        if earlier:
+            last_end = earlier[-1][1]
+            ends_of_windows = [td for _, td in windows if td <= last_end]
+            yield max(ends_of_windows, default=earlier[0][0]), last_end
+    for _, td in windows:
+        start = min((start for start, _ in contacts if start >= td), default=None)
+        if start is not None:
+            yield td, start

@@ -10,7 +10,6 @@ from itertools import islice, zip_longest
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.caching import cached_property
-from d2rpick.base.data_classes import dataclass
 from d2rpick.base.errors import DeckError
 from d2rpick.base.files import bound, describe_excess, find_long_line
 from d2rpick.deck.not_decks import (
@@ -329,14 +328,17 @@ class SourceFile:
         return line
 
 
-@dataclass(eq=False, repr=False)
 class Block:
     """A keyword with all lines up to the next keyword, or an encrypted block, as a byte range of a file."""
 
-    source: SourceFile
-    start: int
-    end: int | None
-    head: str  # Text of the keyword line.
+    # The initialiser of a data class would take longer, and a deck has many keywords.
+    def __init__(
+        self, source: SourceFile, start: int, end: int | None, head: str
+    ) -> None:
+        self.source = source
+        self.start = start
+        self.end = end
+        self.head = head  # Text of the keyword line.
 
     @property
     def encrypted(self) -> bool:

@@ -95,7 +95,7 @@ def list_verdict_lines(
     others = "any other formulation keeps its built-in weight, scaled to these"
     lines.append(("covers", f"{list_names(covered)}; {others}"))
     line = write_command(question, "calibrate", "-f", "toml", "-o", _FILE)
-    step = f"write the weights with {line}, then give plan or parts --weights {_FILE}"
+    step = f"to give plan or parts --weights {_FILE}, write the weights with {line}"
     return [*lines, ("next", step)]
 
 

@@ -235,25 +235,25 @@ def _name_next_step(checks: Checks) -> str:
     if serious:
         worst = min(serious, key=lambda finding: finding.severity.rank)
         explain = tables.quote_shell_line(("d2rpick", "rule", worst.rule))
-        return f"correct the findings above; {explain} explains the most severe one"
+        return (
+            f"correct the findings above; read about the most severe one with {explain}"
+        )
     switching = [result for result in checks.results if result.windows]
     itself = next(filter(_switches_at_unknown_times, checks.results), None)
     if itself:
         folder = tables.make_positional([os.path.dirname(itself.deck) or os.curdir])  # noqa: PTH120  a name with a NUL byte has no folder
         follow = tables.quote_shell_line(("d2rpick", "follow", *folder))
-        return (
-            f"run the deck; meanwhile, {follow} shows when the parts fly or are rigid"
-        )
+        return f"run the deck; meanwhile, see when the parts fly or are rigid with {follow}"
     has_cards = any(result.cards for result in checks.results)
     if not has_cards or not any(
         result.windows or result.findings for result in checks.results
     ):
         found, hint = _name_history(checks)
         plan = tables.quote_shell_line(("d2rpick", "plan", *found))
-        return f"if the run is to be switched, choose the times with {plan}{hint}, and add the cards to the deck"
+        return f"if the run is to be switched, add cards to the deck with times that you choose with {plan}{hint}"
     if all(map(_has_only_untimed_cards, checks.results)):
         explain = tables.quote_shell_line(("d2rpick", "rule", _UNTIMED_RULE))
-        return f"no card has a time that a history can judge; {explain} says how to have such switches judged"
+        return f"no card has a time that a history can judge; see how to have such switches judged with {explain}"
     if checks.history is None:
         # The history next to a deck that switches may be that of the switched run.
         decks = tables.make_positional([result.deck for result in switching])

@@ -50,11 +50,12 @@ _FEWEST: Final = 20
 # Option that accepts no pair in a flight that only the energy shows.
 _STRICT: Final = "--strict"
 # Advice on a table whose run has no deck at hand.
-_ADD_COLUMNS: Final = "; without a deck, add columns mass, x_momentum, y_momentum and z_momentum to the table"
+_ADD_COLUMNS: Final = "without a deck, add columns mass, x_momentum, y_momentum and z_momentum to the table"
+# Hint to replace the placeholder of the main deck.
+_MAIN_DECK: Final = f"main deck of the run instead of {_SOME_DECK}"
 # Reason why the card of several parts needs the main deck.
 _NEEDS_DECK: Final = (
-    f"main deck of the run instead of {_SOME_DECK}; "
-    "without it, parts that share nodes become separate rigid bodies"
+    f"{_MAIN_DECK}; without it, parts that share nodes become separate rigid bodies"
 )
 
 
@@ -65,10 +66,7 @@ class NamedDeck(NamedTuple):
     hint: str
 
 
-def name_deck_of_run(
-    question: RepeatedQuestion,
-    hint: str = f"main deck of the run instead of {_SOME_DECK}",
-) -> NamedDeck:
+def name_deck_of_run(question: RepeatedQuestion, hint: str = _MAIN_DECK) -> NamedDeck:
     """Return the main deck next to the history or, if there is none or decks are excluded, a placeholder."""
     is_excluded = "--no-deck" in question.options
     deck = None if is_excluded else _find_deck(question.files)
@@ -106,8 +104,11 @@ def needs_deck(history: History, settings: Settings) -> bool:
     return switches_parts and not settings.bodies and len(history.parts or ()) > 1
 
 
-def name_step_to_deck(question: RepeatedQuestion) -> str:
-    """Return a text with the command that writes a copy of the main deck with the cards of a plan."""
+def name_step_to_deck(question: RepeatedQuestion, then: str = "") -> str:
+    """Return a text with the command that writes a copy of the main deck with the cards of a plan.
+
+    ``then`` says what to do after the run of this deck.
+    """
     words: tuple[str, ...] = ()
     hint = ""
     if "--deck" not in question.options:
@@ -115,7 +116,8 @@ def name_step_to_deck(question: RepeatedQuestion) -> str:
         words, hint = ("--deck", deck.name), deck.hint
     words = (*question.times, *words, "--write-deck", _FOLDER)
     line = write_command(_allow_deck(question), "plan", *words)
-    return f"write a copy of the deck with the cards: {line}{hint}. Then run the deck in {_FOLDER} from t = 0"
+    action = f"write a copy of the deck with the cards, and run it in {_FOLDER} from t = 0{then}"
+    return f"{action}. This writes the copy: {line}{hint}"
 
 
 def _allow_deck(question: RepeatedQuestion) -> RepeatedQuestion:
@@ -133,10 +135,12 @@ def name_step_to_card(
     command: str,
     *,
     flying: bool,
+    action: str = "print the cards with",
 ) -> str:
     """Return the step that prints the card for windows by ``command`` (``suggest`` or ``plan``) or by ``card``.
 
-    If the files show which parts are ``flying`` but no part or energy was chosen, the step is to choose the parts.
+    ``action`` says what to do with the command, which follows it. If the files show which parts are ``flying`` but no
+    part or energy was chosen, the step is to choose the parts.
     """
     from d2rpick.deck.printing import SOLVERS, find_solver, names_solver
 
@@ -176,7 +180,7 @@ def name_step_to_card(
         line = quote_shell_line(("d2rpick", "card", *words, *question.judging))
     else:
         line = write_command(question, command, *words)
-    return f"print the cards with {line}{hint}"
+    return f"{action} {line}{hint}"
 
 
 def name_step_to_parts(question: RepeatedQuestion, command: str) -> str:
@@ -247,11 +251,13 @@ def _name_step_to_better_record(
 ) -> str:
     """Return the step after a pair that the record cannot support: the deck of the run, or a change of the record."""
     if decision.needs_deck:
-        deck = name_deck_of_run(question)
+        if history.format in ("csv", "hdf5"):
+            deck = name_deck_of_run(question, f"{_MAIN_DECK}; {_ADD_COLUMNS}")
+        else:
+            deck = name_deck_of_run(question)
         words = (*_keep_td(question.times), "--deck", deck.name)
         line = write_command(_allow_deck(question), "suggest", *words)
-        without = _ADD_COLUMNS if history.format in ("csv", "hdf5") else ""
-        return f"judge the run with its deck: {line}{deck.hint}{without}"
+        return f"judge the run with its deck: {line}{deck.hint}"
     return (
         f"improve the record: {decision.cure}; until then, no pair from it can be used"
     )
@@ -357,18 +363,18 @@ def name_step_without_flight(history: History, question: RepeatedQuestion) -> st
     )
     line = write_command(question, "info")
     if not history.energy.any():
-        return f"choose the internal energy as `energy`; {line} names the columns"
+        return f"choose the internal energy as `energy`; see the columns with {line}"
     look = f"see what the run has to write with {line}"
     if history.energy.min() == history.energy.max():
         return (
             f"choose parts that deform or another energy, because the energy is {history.energy[0]:.6g} in all states; "
-            f"{line} names what the files contain"
+            f"see what the files contain with {line}"
         )
     if holes := find_holes(history.time):
         first, last = holes[0]
         return f"add the files of the restart segment that is missing between {first:.6g} and {last:.6g}"
     if not denies_every_flight(history):
-        return f"{more}{look}, or give the end of the load as --after"
+        return f"{more}give the end of the load as --after, or {look}"
     no_pair = f"{more}{name_lack_of_pairs(question)}: {NEVER_FLIES}"
     if hint := describe_hiding_digits(history):
         return f"{no_pair}; {hint}, or run it without switching"
@@ -510,7 +516,7 @@ def name_step_to_derived_margin(question: RepeatedQuestion) -> str:
     """Return the step after a given margin that leaves nothing of a flight: a plan with the margin of the run."""
     options = _leave_out(question.options, "--margin")
     line = write_command(question._replace(options=options), "plan")
-    return f"let d2rpick derive the margin from the run with {line}"
+    return f"leave out --margin, so that it is derived from the run: {line}"
 
 
 def name_step_after_card(
@@ -557,7 +563,7 @@ def name_step_after_extract(file: str) -> str:
     """Return the next step after an energy was extracted into a file."""
     line = quote_shell_line(("d2rpick", "suggest", *make_positional([file])))
     advice = "print the cards from the run itself, because the table names neither its solver nor all its parts"
-    return f"choose times with {line}; {advice}"
+    return f"{advice}; choose times with {line}"
 
 
 def name_step_after_weights(file: str) -> str:
@@ -573,4 +579,4 @@ def name_step_after_first(folder: str) -> str:
     files = make_positional([folder])
     check = quote_shell_line(("d2rpick", "check", *files))
     follow = quote_shell_line(("d2rpick", "follow", *files))
-    return f"check the deck with {check}, and run it; meanwhile, {follow} shows when the parts fly or are rigid"
+    return f"check the deck with {check}, and run it; meanwhile, see when the parts fly or are rigid with {follow}"

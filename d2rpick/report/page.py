@@ -5,7 +5,6 @@ Shared sections are the cards of a pair, the input that was read, and how to rep
 
 from __future__ import annotations
 
-import re
 from base64 import b64encode
 from hashlib import sha256
 from html import escape
@@ -18,7 +17,12 @@ from d2rpick.deck.beside import SOME_NODES, SOME_PARTS
 from d2rpick.deck.printing import DEFAULT, SOLVERS
 from d2rpick.report.decision import list_verdict_lines
 from d2rpick.report.situation import list_health_measures, list_situation_heading
-from d2rpick.report.tables import Cell, format_short, quote_shell_line
+from d2rpick.report.tables import (
+    Cell,
+    format_short,
+    quote_shell_line,
+    split_at_commands,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -50,10 +54,6 @@ _CONTROLS = dict.fromkeys(
 )
 # What the options of a card switch, by option.
 _SWITCHED: Final = {"part": "parts", "node": "main nodes"}
-# A word of a command as `quote_shell_line` writes it.
-_WORD: Final = r"""(?:\$'(?:\\.|[^'\\])*'|'[^']*'|"[^"]*"|[^\s'"(])+"""
-# A command in a sentence, to the end of the clause.
-_COMMAND: Final = re.compile(rf"\bd2rpick(?: {_WORD}(?<![.,;:]))*(?: {_WORD})?")
 _MOST_FILES: Final = 20  # Largest number of deck files that are named on a page.
 # Labels of the lines that the reader of a page fills in by hand.
 SIGNED: Final = ("chosen by", "date", "signature")
@@ -320,24 +320,19 @@ def build_pairs(rows: Iterable[tuple[str, str]]) -> Markup:
 def build_steps(rows: Iterable[tuple[str, str]]) -> Markup:
     """Return a list of names and descriptions in which each command has a line of its own, with a button to copy it.
 
-    A command ends before a hint in parentheses, or with the clause.
-
     Examples
     --------
-    >>> print(build_steps([("next", "look with d2rpick info 'my run.csv'. Then plan")]))
-    <dl><div><dt>next</dt><dd>look with <pre class="wrap">d2rpick info 'my run.csv'</pre>. Then plan</dd></div></dl>
+    >>> print(build_steps([("next", "look with d2rpick info 'my run.csv' (the run)")]))
+    <dl><div><dt>next</dt><dd>look with <pre class="wrap">d2rpick info 'my run.csv'</pre> (the run)</dd></div></dl>
     """
     return build_pairs((name, _mark_commands(text)) for name, text in rows)
 
 
 def _mark_commands(text: str) -> Markup:
-    pieces: list[str] = []
-    end = 0
-    for command in _COMMAND.finditer(text):
-        line = make_element("pre", command[0].rstrip(".,;:"), class_="wrap")
-        pieces += [text[end : command.start()], line]
-        end = command.start() + len(command[0].rstrip(".,;:"))
-    return join([*pieces, text[end:]])
+    return join(
+        make_element("pre", piece, class_="wrap") if is_command else piece
+        for piece, is_command in split_at_commands(text)
+    )
 
 
 def _replace_markup(text: str, *, quote: bool = True) -> str:

@@ -420,6 +420,19 @@ def _list_steps_for_record(
     if is_refused and not written_deck:
         return _list_step_without_window(plan, question)
     waiting = any(row.status == "re-plan" for row in plan.flights)
+    again = "; then plan the remaining flights from that run (--done)" * waiting
+    if written_deck:
+        folder = written_deck.folder
+        times = _name_times_at_rest(plan)
+        compare = write_command(question, "verify", *times, "--switched", folder)
+        first = ""
+        if not written_deck.passed:
+            first = "correct what the check of the written deck found, then "
+        elif written_deck.warned:
+            first = "read the warnings of the check below, then "
+        step = f"{first}run the deck in {folder} from t = 0{again}"
+        return [("next", f"{step}. Compare the run with {compare}")]
+    also = ", which also contain the windows that are done" if plan.done else ""
     cards = name_step_to_card(
         plan.history,
         plan.settings,
@@ -427,31 +440,16 @@ def _list_steps_for_record(
         question,
         "plan",
         flying=any(row.flight.by_parts for row in plan.flights),
+        action=f"print the cards{also}, add them to the deck, and run the deck from t = 0{again}. "
+        "This prints the cards:",
     )
-    if plan.done:
-        cards += "; they also contain the windows that are done"
-    step = f"{cards}. Then add them to the deck, and run the deck from t = 0"
-    if cards.startswith("choose"):
-        step = cards
-    elif needs_deck(plan.history, plan.settings) or (
-        plan.history.parts and "--deck" in question.options
+    chooses_parts = cards.startswith("choose")
+    if not chooses_parts and (
+        needs_deck(plan.history, plan.settings)
+        or (plan.history.parts and "--deck" in question.options)
     ):
-        step = name_step_to_deck(question)
-    if written_deck:
-        folder = written_deck.folder
-        times = _name_times_at_rest(plan)
-        compare = write_command(question, "verify", *times, "--switched", folder)
-        step = (
-            f"run the deck in {folder} from t = 0, and compare the run with {compare}"
-        )
-        if not written_deck.passed:
-            step = f"correct what the check of the written deck found, then {step}"
-        elif written_deck.warned:
-            step = f"{step}, after reading the warnings of its check below"
-    again = (
-        ". Then plan the remaining flights from that run (--done)" if waiting else ""
-    )
-    return [("next", f"{step}{again}")]
+        return [("next", name_step_to_deck(question, again))]
+    return [("next", cards)]
 
 
 def _name_times_at_rest(plan: RunPlan) -> tuple[str, ...]:

@@ -22,6 +22,12 @@ _WORD: Final = 32
 _LEAST: Final = 12
 # Pattern of a word that cmd and PowerShell pass on unchanged without quotes.
 _PLAIN_ON_WINDOWS: Final = r"[\w./\\:=+-]+"
+# _ARGUMENT: pattern of an argument as `quote_shell_line` writes it.
+# _COMMAND: pattern of a command in a sentence, with at least one argument, to the end of the clause.
+_ARGUMENT: Final = r"""(?:\$'(?:\\.|[^'\\])*'|'[^']*'|"[^"]*"|[^\s'"()])+"""
+_COMMAND: Final = rf"\bd2rpick [a-z]+(?: {_ARGUMENT}(?<![.,;:]))*(?: {_ARGUMENT})"
+# Beginning of a line whose text tells what to do next.
+_NEXT: Final = r"next(?=  )|next(?=: )"
 # _NUMBER: pattern of a number, which is not treated as a spreadsheet formula.
 # _SIGNS: =, +, -, @ and their full-width, small, raised and lowered forms, which normalisation turns into these signs.
 # _FORMULA: pattern of a spreadsheet formula, which begins with one of these signs.
@@ -190,6 +196,9 @@ def as_text(
 def wrap_lines(text: str, width: int) -> str:
     r"""Wrap lines longer than ``width``; continuation lines are indented to the text after the name.
 
+    In a line that tells what to do next, each command gets a line of its own, which is not wrapped, so that it can be
+    copied.
+
     Examples
     --------
     >>> print(wrap_lines("quality  fair: the sign is unknown\nbasis    energy", 24))
@@ -229,17 +238,44 @@ def wrap_command(line: str, width: int) -> str:
 
 def _wrap_below_name(line: str, width: int) -> str:
     """Wrap a line; its continuation lines are indented to the text after the name or, without a name, like the line."""
-    from textwrap import fill
+    from textwrap import TextWrapper
 
     name = re.match(r"\s*(?:\S+ )*?\S+  +(?=\S)|\s*", line)
-    indent = len(name[0]) if name and len(name[0]) <= width // 2 else 2
-    return fill(
-        line,
-        width,
-        subsequent_indent=" " * indent,
-        break_long_words=False,
-        break_on_hyphens=False,
+    indent = " " * (len(name[0]) if name and len(name[0]) <= width // 2 else 2)
+    wrapper = TextWrapper(
+        width, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False
     )
+    if not re.match(_NEXT, line):
+        return wrapper.fill(line)
+    label = name[0] if name else ""
+    lines: list[str] = []
+    for piece, is_command in split_at_commands(line.removeprefix(label)):
+        beginning = indent if lines else label
+        if is_command:
+            lines.append(f"{beginning}{piece}")
+        elif piece.strip():
+            wrapper.initial_indent = beginning
+            lines += wrapper.wrap(piece.strip())
+    return "\n".join(lines)
+
+
+def split_at_commands(text: str) -> Iterator[tuple[str, bool]]:
+    """Yield the pieces of a text in their order, and whether each is a command.
+
+    A command ends before a hint in parentheses, or with the clause.
+
+    Examples
+    --------
+    >>> list(split_at_commands("look with d2rpick info 'my run.csv' (the run)"))
+    [('look with ', False), ("d2rpick info 'my run.csv'", True), (' (the run)', False)]
+    """
+    end = 0
+    for match in re.finditer(_COMMAND, text):
+        command = match[0].rstrip(".,;:")
+        yield text[end : match.start()], False
+        yield command, True
+        end = match.start() + len(command)
+    yield text[end:], False
 
 
 def _reduce_widths(

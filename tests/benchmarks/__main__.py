@@ -450,7 +450,7 @@ ROWS = (
     Row(
         "check / import click: processes",
         lambda: process_ratio("click", *CHECK),
-        most=1.5,
+        most=1.45,
     ),
     Row("loop over lines / glstat, 1e5 states", reading("glstat_to_loop"), least=8.0),
     Row("glstat, 1e5 states / bare read", reading("glstat_to_bare_read"), most=4.0),

@@ -923,4 +923,4 @@ def test_the_step_after_a_check_explains_an_error_above_all_warnings() -> None:
     place("late.k", LATE.replace(THERE, "*DATABASE_GLSTAT\n      0.01\n" + THERE))
     result = run("check", "late.k")
     assert result.stdout.index("error D2R101") < result.stdout.index("warning D2R")
-    assert "d2rpick rule D2R101 explains the most severe one" in result.stdout
+    assert "read about the most severe one with d2rpick rule D2R101" in result.stdout

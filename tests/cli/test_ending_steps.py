@@ -119,8 +119,8 @@ def test_without_a_flight_every_command_leads_to_the_missing_output(
     rows = [f"{step / 1000},{(step * 37) % 101 + 1}" for step in range(400)]
     file = put(tmp_path / "run.csv", "\n".join(["time,internal_energy", *rows, ""]))
     step = list_first_lines(*arguments, str(file))["next"]
-    assert step.startswith(f"see what the run has to write with d2rpick info {file}")
-    assert step.endswith("or give the end of the load as --after")
+    assert step.startswith("give the end of the load as --after, or see what the run ")
+    assert step.endswith(f" has to write with d2rpick info {file}")
 
 
 @pytest.mark.slow
@@ -198,8 +198,8 @@ def test_a_plan_after_a_switched_run_prints_the_windows_that_are_done(
     history = write_run_with_a_rigid_window(tmp_path)
     done = str(put(tmp_path / "done.txt", "0.02 0.08\n"))
     step = list_first_lines("plan", "--done", done, history)["next"]
-    assert "; they also contain the windows that are done. Then" in step
-    words = shlex.split(step.partition("with d2rpick ")[2].partition(" (")[0])
+    assert "the cards, which also contain the windows that are done, add them" in step
+    words = shlex.split(step.partition(": d2rpick ")[2].partition(" (")[0])
     card = run(*("1" if word == "IDS" else word for word in words)).stdout
     assert "Rigid from 0.02 to 0.08" in card
     first_plan = list_first_lines("plan", history)["next"]

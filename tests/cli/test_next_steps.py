@@ -47,9 +47,7 @@ def test_the_step_to_the_card_names_the_option_that_the_card_needs(
     command: str,
 ) -> None:
     text = find_line("next", command, ENERGY)
-    match = re.search(
-        r"with d2rpick (card .*) \(ids of your parts instead of IDS", text
-    )
+    match = re.search(r"d2rpick (card .*) \(ids of your parts instead of IDS", text)
     assert match
     card = run(*shlex.split(match[1].replace("IDS", "1")))
     assert card.exit_code == 0
@@ -164,7 +162,7 @@ def test_a_margin_longer_than_the_flight_leads_to_the_margin_of_the_run(
 ) -> None:
     step = find_line("next", *command, "--margin", margin, "--part", "flying", MATSUM)
     line = f"d2rpick plan --part flying {MATSUM}"
-    assert step == f"let d2rpick derive the margin from the run with {line}"
+    assert step == f"leave out --margin, so that it is derived from the run: {line}"
 
 
 @pytest.mark.parametrize("command", ["suggest", "plan", "explore"])
@@ -346,7 +344,7 @@ def test_the_next_command_can_be_typed_as_it_stands(
     arguments: tuple[str, ...], tmp_path: Path
 ) -> None:
     text = find_line("next", *arguments)
-    match = re.search(r"d2rpick (.*?)( \(|\. Then|$)", text)
+    match = re.search(r"d2rpick (.*?)( \(|$)", text)
     assert match, text
     # Only the user knows the parts of a table, the bodies, the main deck and the folder for its copy.
     given = {"IDS": "1", "NODES": "1001", "DECK": DECK}
@@ -400,7 +398,7 @@ def test_the_deck_next_to_a_history_is_named_in_the_next_command(
     monkeypatch.chdir(tmp_path)
     text = find_line("next", *arguments)
     assert f"--deck {DECK}" in text
-    match = re.search(r"d2rpick (.*?)(?:\. Then|$)", text)
+    match = re.search(r"d2rpick (.*?)$", text)
     assert match, text
     step = run(*shlex.split(match[1]))
     written = [path.read_text() for path in Path("switched").glob("*.k")]
@@ -602,8 +600,7 @@ def test_a_plan_of_a_record_that_ends_in_the_flight_asks_for_a_longer_run(
 def test_a_plan_with_a_deck_proposes_its_copy(tmp_path: Path) -> None:
     question = ("--part", "flying", "--deck", DECK, MATSUM)
     step = find_line("next", "plan", *question)
-    line = step.partition("with the cards: d2rpick ")[2].partition(". Then")[0]
-    words = shlex.split(line)
+    words = shlex.split(step.partition("This writes the copy: d2rpick ")[2])
     assert words[:3] == ["plan", "--write-deck", "switched"]
     words[2] = str(tmp_path / "switched")
     assert run(*words).exit_code == 0
@@ -898,3 +895,44 @@ def test_no_step_asks_for_an_end_of_the_load_that_the_momentum_denies(
         " why the motion is good only if the parts fly as you stated with --after: the flight is used as given, "
         "although the momentum shows no free flight" in text
     )
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("verify", "--tr", "0.0127221", "--td", "0.144192", ENERGY),
+        ("suggest", ENERGY),
+        ("plan", ENERGY),
+        ("plan", MATSUM),
+        ("plan", *FLYING),
+        ("plan", "--margin", "0.4", *FLYING),
+        ("suggest", "--landing", "0.1", MATSUM),
+        ("suggest", "--td", "0.064", ENERGY),
+    ],
+    ids=" ".join,
+)
+@pytest.mark.parametrize("columns", ["60", "100"])
+def test_the_next_command_stands_whole_in_one_line_and_beside_no_punctuation(
+    arguments: tuple[str, ...],
+    columns: str,
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+) -> None:
+    """A shell takes the parts of a wrapped command for several commands; on the page, the command is in a box."""
+    monkeypatch.setenv("COLUMNS", columns)
+    report = tmp_path / "page.html"
+    command, *words = arguments
+    screen = run(command, "--report", str(report), *words).stdout
+    step = re.search(r"^next  .*(?:\n  .*)*", screen, re.MULTILINE)
+    assert step
+    boxes = re.findall(
+        r'<dt>next</dt><dd>[^<]*<pre class="wrap">([^<]*)</pre>([^<]*)',
+        report.read_text(),
+    )
+    assert boxes
+    for box, after in boxes:
+        assert re.fullmatch(r"( (\(|\w).*)?", html.unescape(after), re.DOTALL)
+        lines = [line for line in step[0].split("\n") if html.unescape(box) in line]
+        assert len(lines) == 1
+        is_alone = lines[0].strip() == html.unescape(box)
+        assert is_alone or len(lines[0]) <= int(columns)

@@ -686,10 +686,11 @@ def test_runs_are_counted_with_the_time_that_is_left(
 def test_nothing_on_stdout_is_wider_than_the_terminal(
     args: tuple[str, ...], columns: int
 ) -> None:
+    """Only a command stands in one line however long it is, so that it can be copied."""
     result = run(*args, env={"COLUMNS": str(columns)})
-    assert max(map(len, result.stdout.replace(str(ROOT), "").splitlines())) <= min(
-        columns, 100
-    )
+    lines = result.stdout.replace(str(ROOT), "").splitlines()
+    texts = [line for line in lines if not line.lstrip().startswith("d2rpick ")]
+    assert max(map(len, texts)) <= min(columns, 100)
 
 
 def test_an_error_ends_where_the_terminal_does() -> None:
@@ -733,9 +734,7 @@ def test_a_td_at_the_landing_is_answered_by_its_reason_and_the_pair_before_it() 
     assert (
         first == "no pair to use  td = 0.38 lies after the end of the flight at 0.379"
     )
-    assert second.startswith(
-        "next            choose both times in the flight with d2rpick"
-    )
+    assert second.startswith("next            choose both times in the flight with")
     assert " verdict" not in result.stdout
     assert "no-candidate" not in result.stderr
     assert (

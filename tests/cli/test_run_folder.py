@@ -360,6 +360,6 @@ def test_a_written_deck_has_the_findings_that_check_finds_in_it_without_a_histor
     assert counted[0] in checked
     assert ("D2R111" in written) == (keywords != DATABASES) == ("D2R111" in checked)
     assert "no energy history to choose" not in written
-    assert ("after reading the warnings" in " ".join(written.split())) == (
+    assert ("read the warnings of the check below" in " ".join(written.split())) == (
         keywords != DATABASES
     )

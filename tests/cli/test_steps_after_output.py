@@ -115,10 +115,11 @@ def test_a_dry_run_says_whether_the_run_can_be_started(
 def test_calibrate_says_whether_to_use_the_weights(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    text = join_wrapped_lines(run("calibrate", CALIBRATED).stdout)
+    screen = run("calibrate", CALIBRATED).stdout
+    text = join_wrapped_lines(screen)
     assert text.startswith("use weights that fit the CPU time of 2 engine runs")
     monkeypatch.chdir(tmp_path)
-    assert run(*find_command(text, "calibrate")).exit_code == 0
+    assert run(*find_command(screen, "calibrate")).exit_code == 0
     judged = run("parts", "--weights", "weights.toml", "--deck", DECK, MATSUM)
     # The weights are read; they have none for the shells of this other model, so the built-in one is scaled.
     assert re.search("^saves +about", judged.stdout, re.MULTILINE)
@@ -263,7 +264,7 @@ def test_a_plan_without_a_flight_says_so_first(tmp_path: Path) -> None:
     assert text.startswith(
         "do not use any window of this run: no flight is found in the record\nnext "
     )
-    step = f"see what the run has to write with d2rpick info {table}, or give"
+    step = f"or see what the run has to write with d2rpick info {table}"
     assert step in join_wrapped_lines(text)
 
 

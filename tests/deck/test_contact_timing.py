@@ -11,7 +11,8 @@ from hypothesis import given, strategies as st
 import d2rpick as d2
 from d2rpick.base.errors import DeckError
 from d2rpick.deck.contact_timing import Pushes, find_pair_timing, find_sensor_timing
-from tests.command import put, read_refusal, run, run_json
+from tests.command import MATSUM, put, read_refusal, run, run_json
+from tests.sample_deck import DECK
 
 PUSHES = Pushes(
     ((0.0, 0.01), (0.05, 0.06), (0.062, 0.07), (0.12, 0.13), (0.2, 0.21)), speed=3.0
@@ -150,3 +151,24 @@ def test_without_momenta_nothing_shows_when_something_pushes() -> None:
         "card", "--tr", "0.02", "--td", "0.09", "--part", "1", *BY_CONTACT
     )
     assert "needs a history with the force of that contact or wall" in message
+
+
+def test_the_parts_do_not_become_rigid_again_before_the_contact_that_the_offset_anticipates() -> (
+    None
+):
+    timing = find_pair_timing([(0.02, 0.047)], PUSHES)
+    assert flatten_windows(timing.windows) == pytest.approx([0.02, 0.047])
+    assert 0.003 < timing.wait < 0.013  # ends in the contact from 0.05 to 0.06
+
+
+def test_the_check_of_a_pair_with_an_offset_ends_and_finds_the_window_of_the_card(
+    tmp_path: Path,
+) -> None:
+    """Before, the check followed the two sets step by step without end, and took all memory."""
+    question = ("plan", MATSUM, "--part", "flying", "--deck", str(DECK), *BY_CONTACT)
+    written = run(*question, "--write-deck", str(tmp_path / "next"))
+    checked = " ".join(written.stdout.split()).partition(
+        "rollover_box.k use with care"
+    )[2]
+    assert "parts 1, 2: rigid from 0.123689 to 0.37 (" in checked
+    assert "D2R208" not in checked

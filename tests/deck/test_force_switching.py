@@ -89,3 +89,16 @@ def test_the_delay_that_keeps_chatter_out_does_so() -> None:
     assert [tr for tr, _ in delay] == pytest.approx([tr for tr, _ in wanted])
     assert [td for _, td in delay] == [0.02, 0.06, None]
     assert find_delay_without_chatter([(0.0, 0.02)], []) is None
+
+
+def test_sets_whose_conditions_both_hold_are_followed_to_the_next_change_of_force() -> (
+    None
+):
+    """Between 0.019 and 0.02, the second set acts by its offset, and the first one because no force acts yet."""
+    ahead = [(start - 0.001, end) for start, end in BOUNCES[1:]]
+    windows = follow_pair(TO_RIGID, BACK, BOUNCES[1:], 0.05, ahead)
+    lasting = [(tr, td) for tr, td in windows if td is None or td - tr > 1e-4]
+    assert lasting == [(0.0, 0.019), (0.03, None)]
+    assert len(windows) < 10
+    wait = find_delay_without_chatter([(0.0, 0.019)], BOUNCES[1:])
+    assert wait == pytest.approx(0.001)
