@@ -7,7 +7,7 @@ from typing import IO, TYPE_CHECKING, Any
 
 from d2rpick.api import arguments
 from d2rpick.base.data_classes import dataclass
-from d2rpick.base.errors import give_if_written
+from d2rpick.base.errors import DamageError, give_if_written
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -60,8 +60,11 @@ class Run:
     def _repr_html_(self) -> str | None:
         from d2rpick.report.pages import show_at_a_glance
 
-        overview = give_if_written(self.overview)
-        history = give_if_written(lambda: self.files.history(self.chosen))
+        try:
+            overview = give_if_written(self.overview)
+            history = give_if_written(lambda: self.files.history(self.chosen))
+        except DamageError:
+            return None
         if overview is None or history is None:
             return show_at_a_glance("overview", overview, None) if overview else None
         from d2rpick.report.figures_choice import draw_run

@@ -11,6 +11,7 @@ import numpy as np
 
 from d2rpick.base.errors import (
     Caution,
+    DamageError,
     EnergyChoiceError,
     FormatError,
     RangeError,
@@ -434,9 +435,15 @@ def _assess_health_of_run(
     rigid: Sequence[Times],
 ) -> Health | None:
     """Return the health of the run outside its rigid windows; None if no energies were written."""
-    balance = read_balance(
-        run.databases, run.parts, known=history.balance if history else None
-    )
+    try:
+        balance = read_balance(
+            run.databases, run.parts, known=history.balance if history else None
+        )
+    except DamageError:
+        # Without a history, the overview reports already that the file is damaged.
+        if history is not None:
+            raise
+        return None
     if balance is None or not balance.time.size:
         return None
     if rigid:
