@@ -11,6 +11,8 @@ import numpy as np
 
 from d2rpick.base.errors import (
     Caution,
+    DamageError,
+    DamageError,
     EnergyChoiceError,
     FormatError,
     RangeError,
@@ -434,12 +436,16 @@ def _assess_health_of_run(
     flights: Sequence[FreeFlight],
     rigid: Sequence[Times],
 ) -> Health | None:
-    """Return the health of the run outside its rigid windows; None if no energies were written or they are damaged."""
-    known = history.balance if history else None
-    # If the energies are damaged, a warning says so.
-    balance = give_if_readable(
-        lambda: read_balance(run.databases, run.parts, known=known)
-    )
+    """Return the health of the run outside its rigid windows; None if no energies were written."""
+    try:
+        balance = read_balance(
+            run.databases, run.parts, known=history.balance if history else None
+        )
+    except DamageError:
+        # Without a history, the overview reports already that the file is damaged.
+        if history is not None:
+            raise
+        return None
     if balance is None or not balance.time.size:
         return None
     if rigid:
