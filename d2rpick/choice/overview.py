@@ -12,7 +12,6 @@ import numpy as np
 from d2rpick.base.errors import (
     Caution,
     DamageError,
-    DamageError,
     EnergyChoiceError,
     FormatError,
     RangeError,
