@@ -217,7 +217,7 @@ def _describe_last_state(news: News, names: Sequence[str], step: str) -> Event:
     elif step:
         message = "no flight was seen during the run"
     if step and since is None and not news.was_switched:
-        message += "; d2rpick plan judges the whole record, which may show one"
+        message += "; d2rpick plan judges the whole record, which may show a flight"
     if step and news.was_switched:
         message += f"; this run was switched: {step}"
     elif step:

@@ -191,7 +191,7 @@ def test_a_run_that_is_over_is_not_said_to_fly_later() -> None:
     news = News(0.0, 1.0, knows_wait=True, ending="normally")
     *_, state = describe_news([news], ["T01"], ())
     assert state.message == (
-        "no flight was seen during the run; d2rpick plan judges the whole record, which may show one; "
+        "no flight was seen during the run; d2rpick plan judges the whole record, which may show a flight; "
         "choose times with d2rpick plan T01"
     )
     *_, state = describe_news([news._replace(ending=None)], ["T01"], ())

@@ -443,7 +443,7 @@ def _list_remarks_on_switch(
         yield "rigid in the deck, but has internal energy in the history"
     if row.flight and row.flight.deforms is not None:
         yield (
-            "flies, so it can be rigid; vibrates, so its energy at tr must match td"
+            "flies, so it can be rigid; vibrates, so its energies at tr and td must match"
             if row.flight.deforms
             else "flies, so it can be rigid; does not vibrate, so any tr fits"
         )
