@@ -39,12 +39,27 @@ _WARNINGS_TOPIC_INTRODUCTIONS: Final = {
 }
 _JSON_INTRODUCTION: Final = (
     "This page lists the keys that `-f json` and `-f ndjson` print. The folder `d2rpick/schemas` of the package "
-    "contains the schemas. Within one schema number, keys are only added. `null` means unknown. A name with dots is a "
-    "key within a key, and `[]` stands for each item of a list."
+    "contains the schemas. As long as the schema number is the same, keys are added but never removed. `null` means "
+    "unknown. A name with dots is a key within a key, and `[]` stands for each item of a list."
 )
 _COMMANDS_INTRODUCTION: Final = (
     "This page lists every command with all its options, as `d2rpick COMMAND --help` prints them. HISTORY is a file, a "
     "folder or a quoted pattern for the files of one run ([histories](histories.md)). DECK is a main deck."
+)
+
+_OPTION: Final = r"--[a-z][a-z-]*[a-z]"
+# What a text for the terminal names without marks: commands with their options, options, keywords and Radioss cards.
+_CODE: Final = re.compile(
+    "|".join(
+        (
+            r"d2rpick card \.\.\. \| d2rpick check -",
+            rf"\bd2rpick (?:{'|'.join(COMMANDS)})\b(?: ID\b| {_OPTION})*",
+            rf"(?<![\w-]){_OPTION}(?: (?:good|poor)\b)?",
+            r"(?<![\w*])\*[A-Z][A-Z0-9_]+(?:/_[A-Z]+)*(?:\.\.\.(?:_[A-Z]+)?)?",
+            r"(?<![\w/])//?[A-Z][A-Z0-9]+(?:/[A-Z0-9]+)*",
+            r"#include\b",
+        )
+    )
 )
 
 _SOLVERS: Final = {"ls-dyna": "LS-DYNA", "radioss": "Radioss"}
@@ -105,7 +120,7 @@ def _described(context: click.Context) -> Iterator[str]:
         f"`d2rpick {context.info_name} {usage}`",
         "",
     )
-    yield " ".join((context.command.help or "").split())
+    yield mark_code(" ".join((context.command.help or "").split()))
 
 
 def _options(context: click.Context) -> Iterator[tuple[str, str]]:
@@ -114,7 +129,7 @@ def _options(context: click.Context) -> Iterator[tuple[str, str]]:
         if isinstance(option, click.Option):
             record = option.get_help_record(context)
             if record:
-                yield f"`{cell(record[0])}`", cell(record[1])
+                yield f"`{cell(record[0])}`", cell(mark_code(record[1]))
 
 
 def _examples(epilog: str) -> Iterator[str]:
@@ -128,17 +143,24 @@ def rules_page() -> str:
     """Write the page of the rules of check; the anchor of a rule is its id in small letters."""
     lines = ["# Rules of check", "", _RULES_INTRODUCTION, ""]
     rows = [
-        (f"[{rule.id}](#{rule.id.lower()})", rule.severity, cell(rule.summary))
+        (
+            f"[{rule.id}](#{rule.id.lower()})",
+            rule.severity,
+            cell(mark_code(rule.summary)),
+        )
         for rule in RULES.values()
     ]
     lines += table(("rule", "severity", "finds"), rows)
     for rule in RULES.values():
         solvers = " and ".join(_SOLVERS[solver] for solver in rule.solvers)
         lines += ["", f"## {rule.id}", ""]
-        lines += [f"**{rule.severity}**, {solvers}: {rule.summary}.", ""]
+        lines += [f"**{rule.severity}**, {solvers}: {mark_code(rule.summary)}.", ""]
         paragraphs = re.split(r"\n\s*\n", rule.explanation.strip())
-        lines += ["\n\n".join(" ".join(text.split()) for text in paragraphs), ""]
-        lines += [f"**Fix.** {' '.join(rule.fix.split())}"]
+        lines += [
+            "\n\n".join(mark_code(" ".join(text.split())) for text in paragraphs),
+            "",
+        ]
+        lines += [f"**Fix.** {mark_code(' '.join(rule.fix.split()))}"]
     return "\n".join(lines) + "\n"
 
 
@@ -150,8 +172,8 @@ def warnings_page() -> str:
         if topic in _WARNINGS_TOPIC_INTRODUCTIONS:
             lines += ["", _WARNINGS_TOPIC_INTRODUCTIONS[topic]]
         for code, (means, fix) in explanations.items():
-            lines += ["", f"### {code}", "", link_rules(means)]
-            lines += ["", f"**Fix.** {link_rules(fix)}"]
+            lines += ["", f"### {code}", "", link_rules(mark_code(means))]
+            lines += ["", f"**Fix.** {link_rules(mark_code(fix))}"]
     return "\n".join(lines) + "\n"
 
 
@@ -160,6 +182,17 @@ def link_rules(text: str) -> str:
     return re.sub(
         r"D2R\d{3}", lambda match: f"[{match[0]}](rules.md#{match[0].lower()})", text
     )
+
+
+def mark_code(text: str) -> str:
+    """Return the text with commands, options, keywords and Radioss cards marked as code.
+
+    >>> mark_code("Give --deck, or run d2rpick plan --done (*MAT_RIGID, /RBODY/ON).")
+    'Give `--deck`, or run `d2rpick plan --done` (`*MAT_RIGID`, `/RBODY/ON`).'
+    """
+    pieces = re.split(r"(`[^`]*`)", text)
+    pieces[::2] = [_CODE.sub(r"`\g<0>`", piece) for piece in pieces[::2]]
+    return "".join(pieces)
 
 
 def json_page() -> str:

@@ -126,7 +126,9 @@ class Cards:
         "ID",
     )
     wall: int | None = make_option(
-        "Rigid wall whose force triggers the switch (the same solvers).", _IDS, "ID"
+        "Rigid wall whose force triggers the switch (solvers ls-dyna-contact, radioss-contact).",
+        _IDS,
+        "ID",
     )
 
     @classmethod

@@ -18,8 +18,8 @@ class JudgingOptions(TypedDict, total=False):
 
     ``after``: end of the load (default: found from the record).  ``landing``: time of the next contact after the
     flight; td is at least one margin earlier (default: found from the record).  ``margin``: time kept free after the
-    load and before the next contact (default: none after the load. Before the contact: chosen from the flight and the
-    vibration; none if you give ``td`` without ``landing``).  ``tolerance``: largest allowed frozen-deformation error
+    load and before the next contact (default: after the load, none; before the contact, from the flight and the
+    vibration, or none with ``td`` but without ``landing``).  ``tolerance``: largest allowed frozen-deformation error
     or, with the basis energy, largest allowed level error. Not used with the basis modal (default: 0.2).
     ``max_kinetic_share``: reject a td at which a larger fraction of the vibration energy is kinetic.
     ``max_residual``: reject a pair with a larger residual.  ``min_quality``: exit with 1 if the grade is lower than
@@ -41,10 +41,10 @@ class Choosing(JudgingOptions, total=False):
     ``fit_window``: time range to which the oscillator is fitted.  ``strict``: recommend no pair if the end of the load
     is known from the energy alone (default: False).  ``keep_vibration``: grade the vibration by its residual alone,
     even if the next contact has far more energy than the error (default: False).  ``cost_share``: fraction of the CPU
-    time of a time step that is saved while the parts are rigid; predicts the saving.  ``step_ratio``: time step while
-    the parts are rigid, divided by the time step before; at least 1 (default: 1).  ``oscillator``: given instead of
-    identified, with ``v0``.  ``v0``: velocity of the frame of ``oscillator`` at time 0.  ``replay``: False: judge by
-    the energy level alone, without an oscillator (default: True).
+    time per time step that is saved while the parts are rigid; used to predict the saving.  ``step_ratio``: time step
+    while the parts are rigid, divided by the time step before; at least 1 (default: 1).  ``oscillator``: given instead
+    of identified, with ``v0``.  ``v0``: velocity of the frame of ``oscillator`` at time 0.  ``replay``: False: judge
+    by the energy level alone, without an oscillator (default: True).
     """
 
     fit_window: tuple[float | str, float | str] | None

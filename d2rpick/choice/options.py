@@ -115,8 +115,8 @@ class ChoiceOptions:
         metadata=_describe_use(of_cards=True),
     )
     margin: float | None = make_option(
-        "Time kept free after the load and before the next contact.  [default: none after the load. Before the "
-        "contact: chosen from the flight and the vibration; none if you give `td` without `landing`]",
+        "Time kept free after the load and before the next contact.  [default: after the load, none; before the "
+        "contact, from the flight and the vibration, or none with `td` but without `landing`]",
         NOT_NEGATIVE,
         "T",
         metadata=_describe_use(of_cards=True),
@@ -171,7 +171,7 @@ class ChoiceOptions:
         metadata=_describe_use(of_cards=True, of_sets=False),
     )
     cost_share: float | None = make_option(
-        "Fraction of the CPU time of a time step that is saved while the parts are rigid; predicts the saving.",
+        "Fraction of the CPU time per time step that is saved while the parts are rigid; used to predict the saving.",
         FRACTION,
         "C",
         metadata=_describe_use(of_sets=False, is_advanced=True),

@@ -44,7 +44,9 @@ _ABSENT = (
     stiffness=_NEEDED, mass=_NEEDED, alpha={"default": 0.0}, t_end=_NEEDED, dt=_NEEDED,
 )  # fmt: skip
 @options.add_options(
-    "plot", *FILES, plot="Draw displacements and energies to FILE (png, svg, pdf)."
+    "plot",
+    *FILES,
+    plot="Plot displacements and energies, and write the figure to FILE (png, svg, pdf).",
 )
 def replay(motion: Motion, output: Output) -> None:
     r"""Compute the floating oscillator in closed form, with or without switching.
@@ -87,7 +89,7 @@ def replay(motion: Motion, output: Output) -> None:
         "default": None,
         "help": "Format of the scan result.  [default: table]",
     },
-    plot="Draw the motion of the box, or the scan, to FILE (png, svg, pdf).",
+    plot="Plot the motion of the box, or the scan, and write the figure to FILE (png, svg, pdf).",
 )
 def rollover(box: Box, output: Output) -> None:
     """Simulate a planar box (SI units) that trips over the curb of a braking sled and rolls, or that falls and bounces.

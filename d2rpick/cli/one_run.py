@@ -197,9 +197,9 @@ def explore(
     """Show the best tr, the error and the rigid time for each td.
 
     d2rpick compares evenly spaced values of td, and every peak of the energy, in --td-window.  The default is the
-    flight that contains --td, else the longest flight.  It judges each td as `suggest --td` does.  The table lists the
-    Pareto-optimal pairs: every other pair has a larger error or a shorter rigid time.  d2rpick also names the nearest
-    td with half the error.
+    flight that contains --td, or otherwise the longest flight.  d2rpick judges each td as `suggest --td` does.  The
+    table lists the Pareto-optimal pairs: any pair with a smaller error has a shorter rigid time, and any pair with a
+    longer rigid time has a larger error.  d2rpick also names the nearest td with half the error.
 
     Examples
     --------
@@ -375,8 +375,8 @@ def parts(tr: float | None, td: float | None, request: Request, output: Output) 
 
 @options.make_command
 @options.make_click_option("min_rigid", Option(
-    "Shortest rigid window.  [default: 5% of the record; without this option, d2rpick also leaves out a window that "
-    "would shift a later one more than twice as long]",
+    "Shortest rigid window.  [default: 5% of the record; without this option, d2rpick also leaves out a window if it "
+    "would shift a later window that is more than twice as long]",
     *(NOT_NEGATIVE, "T"),
 ))  # fmt: skip
 @click.option(
@@ -390,7 +390,8 @@ def parts(tr: float | None, td: float | None, request: Request, output: Output) 
 )
 @options.make_file_option(
     "--before",
-    "Reference run of --done: compare its landings with those of HISTORY; repeatable.",
+    "Run from which the windows of --done were planned; d2rpick compares its landings with the landings in HISTORY; "
+    "repeatable.",
     *("HISTORY",), many=True,
 )  # fmt: skip
 @options.make_file_option(

@@ -460,7 +460,7 @@ _FLAGS: Final = [
         ),
         (
             ["-v", "--verbose"],
-            "Print all details, and on stderr each file that is read, with the time that reading took.",
+            "Print all details, and list on stderr each file read and how long reading took.",
         ),
     )
 ]

@@ -78,7 +78,9 @@ class Output:
     """Output that writes results to stdout or a file, and messages to stderr. It never overwrites ``inputs``."""
 
     plot: str | None = make_option(
-        "Draw energy and motion to FILE (png, svg, pdf).", "output", "FILE"
+        "Plot energy and motion, and write the figure to FILE (png, svg, pdf).",
+        "output",
+        "FILE",
     )
     report: str | None = make_option(
         "Write everything to one HTML page to read, print and sign.", "output", "FILE"

@@ -97,8 +97,8 @@ def drive(
 
     DECK, a starter deck with one engine file, is copied into RUNDIR.  When no force has acted on the parts for the time
     of --wait, they are treated as flying.  A rigid probe run then finds the next contact.  The parts become deformable
-    one margin before this contact.  The result is reproducible: the same command gives the same run.  --resume
-    continues an interrupted run.
+    at the time --margin before this contact.  The result is reproducible: the same command gives the same run.
+    --resume continues an interrupted run.
 
     Examples
     --------

@@ -1,7 +1,7 @@
 """Define the fields of results: the type, the meaning and the source of the value for each key.
 
 A row of fields determines the JSON of an object, its CSV row, the columns of a frame, and the schemas in
-``d2rpick/schemas``.  Within one schema number, keys are only added.
+``d2rpick/schemas``.  As long as the schema number is the same, keys are added but never removed.
 """
 
 from __future__ import annotations

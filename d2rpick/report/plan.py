@@ -221,17 +221,20 @@ DOCUMENT: Final = Document(
             lambda plan: plan.flights,
         ),
         Field(
-            "rigid_time", "number", "sum of the rigid times of all supported windows"
+            "rigid_time",
+            "number",
+            "sum of the rigid times of the windows whose status is supported",
         ),
         Field(
             "rigid_fraction",
             "number",
-            "fraction of the simulated time that is rigid with all supported windows",
+            "fraction of the simulated time that is rigid in the windows whose status is supported",
         ),
         Field(
             "run_time_share",
             "number?",
-            "CPU time relative to the reference run, with all supported windows; null if the cost is unknown",
+            "CPU time relative to the reference run, with the windows whose status is supported; null if the cost is "
+            "unknown",
         ),
         Field(
             "fewest_cycles",

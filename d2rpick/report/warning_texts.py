@@ -59,7 +59,7 @@ EXPLANATIONS_BY_TOPIC: Final = {
         "margin-kept": Explanation(
             "td could be later, but d2rpick keeps a margin before the next contact, because switching may advance "
             "this contact.",
-            "Nothing to do. --margin sets another margin.",
+            "Nothing to do. To change the margin, use --margin.",
         ),
         "no-flight": Explanation(
             "Nothing in the record shows when the load ends, so d2rpick cannot recommend a tr.",
@@ -107,7 +107,7 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "Omit --td, compare other values of td with d2rpick explore, or choose other parts.",
         ),
         "flight-outside-record": Explanation(
-            "The momenta show a flight that lasts longer than the record of the energy. The files may belong to "
+            "The momenta show a flight that continues after the end of the energy record. The files may belong to "
             "different runs, or one of them was truncated.",
             "Give the files of one run only, or copy the shorter file again.",
         ),
@@ -162,9 +162,9 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "Write matsum (LS-DYNA) or /TH/PART (Radioss) in the next run.",
         ),
         "rigid-legs": Explanation(
-            "Parts were rigid in the stated interval. Their energies have no meaning in this interval, and d2rpick "
-            "does not use them.",
-            "Use a reference run, in which no part is switched. For a switched run, use plan with --done.",
+            "The record that d2rpick info examines contains an interval in which parts were rigid. Their energies have "
+            "no meaning in this interval, and d2rpick does not use them.",
+            "Use a reference run, in which no part is switched. For a switched run, use d2rpick plan --done.",
         ),
         "switched-run-ended": Explanation(
             "The switched run ended before the next contact, or its listing reports an error. The runs agree as far as "
@@ -200,7 +200,7 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "Find the cause in the reference run, such as mass scaling, contacts or hourglassing, and run it again.",
         ),
         "energy-too-large": Explanation(
-            "The energies exceed every physical value, so d2rpick does not use the run.",
+            "The energies are far larger than physically possible, so d2rpick does not use the run.",
             "Check the units, and check whether the run is stable.",
         ),
         "eroded-energy": Explanation(
@@ -247,8 +247,8 @@ EXPLANATIONS_BY_TOPIC: Final = {
     },
     "Deck, parts and cards": {
         "body-left-rigid": Explanation(
-            "The deck keeps parts rigid that deform in the history. The deck does not belong to the history, or an "
-            "engine file is missing.",
+            "Some parts that deform in the history stay rigid in the deck. The deck does not belong to the history, or "
+            "an engine file is missing.",
             "Deactivate these rigid bodies in the first engine file, as rule D2R409 explains.",
         ),
         "body-through-wall": Explanation(
@@ -311,7 +311,7 @@ EXPLANATIONS_BY_TOPIC: Final = {
         ),
         "no-angle": Explanation(
             "The part momenta do not show the rotation of these parts, so the rotation error at td is unknown.",
-            "Give the deck with --deck, or compare with a switched run (verify --switched).",
+            "Give the deck with --deck, or compare with a switched run (d2rpick verify --switched).",
         ),
         "no-deck": Explanation(
             "Without a deck, the costs and connections of the parts are unknown.",
@@ -346,12 +346,12 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "Give the deck with all its includes (--deck), or merge the parts with --merge.",
         ),
         "same-leg-twice": Explanation(
-            "calibrate found the same restart segment or engine run twice. It uses this run once.",
+            "d2rpick calibrate found the same restart segment or engine run twice, and counts it only once.",
             "Nothing to do.",
         ),
         "several-bodies": Explanation(
             "The parts become several rigid bodies, and the position error of at least one of them is unknown.",
-            "Compare with a switched run (verify --switched).",
+            "Compare with a switched run (d2rpick verify --switched).",
         ),
         "stresses-unturned": Explanation(
             "Solid elements without a co-rotational stress update do not rotate their stresses while the body is "
@@ -364,7 +364,8 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "Check the named tie, and merge the parts that it joins with --merge.",
         ),
         "unknown-rule": Explanation(
-            "select, ignore or a comment in the deck names a rule that does not exist, so it has no effect.",
+            "A setting (select, ignore) or a comment in the deck names a rule that does not exist, so it has no "
+            "effect.",
             "Correct the id. d2rpick rule lists all rules.",
         ),
         "unreadable-deck": Explanation(
@@ -382,13 +383,13 @@ EXPLANATIONS_BY_TOPIC: Final = {
         ),
         "deck-of-another-solver": Explanation(
             "One solver wrote the history, and the deck is for the other solver. d2rpick uses the loads, connections "
-            "and costs of the deck, which hold only if both describe the same model.",
+            "and costs of the deck. These data are valid only if history and deck describe the same model.",
             "Give the deck of the run, or check that both models are the same.",
         ),
         "built-in-weights": Explanation(
             "Your weights lack some element formulations of the deck. For these, d2rpick uses the built-in weights, "
             "multiplied by the median ratio of your weights to the built-in weights.",
-            "Calibrate also with runs that contain these formulations (d2rpick calibrate), or add their weights under "
+            "Also calibrate with runs that contain these formulations (d2rpick calibrate), or add their weights under "
             "[per_element].",
         ),
     },
@@ -408,9 +409,9 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "To plan the longer window first, set --min-rigid to a value between the two lengths.",
         ),
         "rigid-times": Explanation(
-            "A switched run wrote this record: parts were rigid in the stated interval. d2rpick does not use this "
-            "interval as a flight. The deformation that was frozen in this interval also changes the vibration after "
-            "it.",
+            "The record from which d2rpick is to choose times is the record of a switched run. d2rpick does not use "
+            "the interval in which parts were rigid as a flight. The deformation that was frozen in this interval also "
+            "changes the vibration after it.",
             "Choose times from the reference run. To plan the later windows of the switched run, use d2rpick plan "
             "--done.",
         ),
@@ -440,8 +441,8 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "part, check that all runs switch the same parts.",
         ),
         "mixed-parts": Explanation(
-            "The runs were judged by the energies of different parts. The common tr then belongs to different switches "
-            "in different runs.",
+            "The runs were judged by the energies of different parts. The common tr then applies to different sets of "
+            "parts in different runs.",
             "Name the same parts for all runs by their numbers with --part.",
         ),
         "mixed-units": Explanation(

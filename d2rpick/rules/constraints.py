@@ -248,7 +248,7 @@ def _find_active(
             cure = f"{held} ({rule_of_deleted}): {merging}, and {cure}; or keep {name_units(joining.flags)} deformable"
         elif not joining.is_one_body:
             held = f"its {name_units(joining.parts)} become separate rigid bodies"
-            cure = f"{held} ({rule_of_deleted}): merge them by LRB, and {cure}"
+            cure = f"{held} ({rule_of_deleted}): merge them with LRB, and {cure}"
         yield joining.constraint.place, f"{problem}; {cure}"
 
 
@@ -270,7 +270,7 @@ def _find_separating(case: Case, kinds: Sequence[Kind]) -> Iterator[PlacedMessag
             message = f"{problem}, but {held}; {merging}, or keep {name_units(joining.flags)} deformable"
         else:
             message = (
-                f"{problem}, but they become separate rigid bodies; merge them by LRB"
+                f"{problem}, but they become separate rigid bodies; merge them with LRB"
             )
         yield joining.constraint.place, message
 
@@ -300,15 +300,16 @@ def _advise_lead_part(joining: _Joining) -> str:
     ]
 )
 @make_rule_decorator(
-    "D2R112", ERROR, "a nodal rigid body on a switched part stays active (NRBF)"
+    "D2R112", ERROR, "a nodal rigid body that stays active on a switched part (NRBF)"
 )
 def _check_nodal_bodies(case: Case) -> Iterator[PlacedMessage]:
     """A node cannot belong to two rigid bodies. The card that makes a part rigid must delete the nodal rigid bodies on
     it, and the card that switches back must activate them again. Otherwise the run stops (Error 30164, as a public drop
     tool reports). Source: vendor keyword data for NRBF, according to which such bodies cause instabilities.
 
-    Fix: Set NRBF to 1 on the card that makes the part rigid and to 2 on the card that switches it back. If the body
-    also holds a part that stays deformable, do not delete it (D2R120): switch both parts, or neither.
+    Fix: Set NRBF to 1 on the card that makes the part rigid and to 2 on the card that switches it back. If the nodal
+    rigid body also holds a part that stays deformable, do not delete the body (D2R120): switch all of its parts, or
+    none.
     """
     return _find_active(case, _NODAL, "D2R120")
 
@@ -331,11 +332,11 @@ def _check_nodal_bodies(case: Case) -> Iterator[PlacedMessage]:
     "D2R120", ERROR, "a deleted nodal rigid body (NRBF 1) that joins separate bodies"
 )
 def _check_separated_parts(case: Case) -> Iterator[PlacedMessage]:
-    """While NRBF 1 deletes a nodal rigid body, only the rigid body of its parts connects them. The parts that it joins
-    separate if they become several rigid bodies, or if one of them is not switched. Source: vendor keyword data for
+    """While a nodal rigid body is deleted (NRBF 1), its parts are held together only by a common rigid body. The parts
+    come apart if they become several rigid bodies, or if one of them is not switched. Source: vendor keyword data for
     NRBF and LRB.
 
-    Fix: Switch all parts of the body and merge them by LRB, or switch none of them. If one of them has *MAT_RIGID, it
+    Fix: Switch all parts of the body and merge them with LRB, or switch none of them. If one of them has *MAT_RIGID, it
     cannot be switched: write its id as LRB of the others.
     """
     return _find_separating(case, _NODAL)
@@ -361,7 +362,7 @@ def _check_separated_parts(case: Case) -> Iterator[PlacedMessage]:
 @make_rule_decorator(
     "D2R113",
     WARNING,
-    "extra nodes, a joint or a weld on a switched part stays active (NRBF, NCSF)",
+    "extra nodes, a joint or a weld that stays active on a switched part (NRBF, NCSF)",
 )
 def _check_other_constraints(case: Case) -> Iterator[PlacedMessage]:
     """Extra nodes, joints, spotwelds, rivets, generalized welds and constrained node sets constrain nodes. On a part
@@ -373,7 +374,7 @@ def _check_other_constraints(case: Case) -> Iterator[PlacedMessage]:
 
     Fix: Set the flag to 1 on the card that makes the part rigid and to 2 on the card that switches it back: NCSF for
     spotwelds, rivets and node sets, NRBF for generalized welds. For joints and extra nodes, set NCSF, and NRBF too if
-    they stay active in the run. If the constraint joins parts that do not become one rigid body, merge them by LRB
+    they stay active in the run. If the constraint joins parts that do not become one rigid body, merge them with LRB
     first (D2R121). A part with *MAT_RIGID cannot be switched: write its id as LRB of the part that it is joined to, or
     keep that part deformable.
     """
@@ -410,7 +411,7 @@ def _check_separated_joints(case: Case) -> Iterator[PlacedMessage]:
     bodies on the parts may hold the joint; NRBF 1 deletes them too. Source: vendor keyword data for NRBF, NCSF and LRB.
     Whether the flags act on joints and extra nodes has not been tested, so the rule only warns.
 
-    Fix: Switch all parts and merge them by LRB. If they move relative to each other in the flight, like a door on its
+    Fix: Switch all parts and merge them with LRB. If they move relative to each other in the flight, like a door on its
     hinge, keep all of them deformable.
     """
     return _find_separating(case, _OTHERS)
@@ -446,7 +447,7 @@ def _check_merged_bodies(case: Case) -> Iterator[PlacedMessage]:
             problem = f"{name_units(named)} {choose_verb(named)} made rigid by a card"
             yield (
                 place,
-                f"{problem}, but this keyword merges only *MAT_RIGID parts; remove it, and merge by LRB on the card",
+                f"{problem}, but this keyword merges only *MAT_RIGID parts; remove it, and merge with LRB on the card",
             )
 
 
@@ -480,11 +481,11 @@ def _check_merged_bodies(case: Case) -> Iterator[PlacedMessage]:
 def _check_tied_contacts(case: Case) -> Iterator[PlacedMessage]:
     """The switching cards do not delete tied contacts. A tied contact without OFFSET is a constraint on nodes, and
     rigid bodies cannot obey it, so the tied parts may separate while one of them is rigid. With OFFSET (but not
-    CONSTRAINED_OFFSET), the contact acts by a penalty force and may connect a rigid part to a deformable part. Between
-    two rigid bodies, such as a switched part and a part with *MAT_RIGID, they do not move as one body. Source: the
-    vendor's public manual on tied contacts. Not tested with the solver.
+    CONSTRAINED_OFFSET), the contact acts by a penalty force and may connect a rigid part to a deformable part. Two
+    rigid bodies, such as a switched part and a part with *MAT_RIGID, do not move as one body, even with OFFSET. Source:
+    the vendor's public manual on tied contacts. Not tested with the solver.
 
-    Fix: Switch both parts and merge them by LRB. If one of them has *MAT_RIGID, write its id as LRB of the other. If
+    Fix: Switch both parts and merge them with LRB. If one of them has *MAT_RIGID, write its id as LRB of the other. If
     one of them should stay deformable, add OFFSET to the contact, or keep both deformable.
     """
     first = {event.unit.id: event for event in reversed(case.made_rigid)}
@@ -522,7 +523,7 @@ def _check_tied_contacts(case: Case) -> Iterator[PlacedMessage]:
         ):
             yield (
                 card.here,
-                f"this contact ties {names}, which become separate rigid bodies; merge them by LRB",
+                f"this contact ties {names}, which become separate rigid bodies; merge them with LRB",
             )
 
 
@@ -562,10 +563,10 @@ _LOOSE_RIGID: Final = (
     "a switched part merged into a *MAT_RIGID part that is not attached",
 )
 def _check_merged_into_loose_part(case: Case) -> Iterator[PlacedMessage]:
-    """LRB merges a switched part into a part with *MAT_RIGID: while it is rigid, both move as one body. Elements,
-    constraints and tied contacts of the deck do not connect these parts, directly or by other parts, so they move
-    separately in the reference run. A flying part that is merged into a rigid ground does not fly. d2rpick does not
-    apply this rule if it cannot read some of the elements or ties.
+    """LRB merges a switched part into a part with *MAT_RIGID: while the switched part is rigid, both parts move as one
+    body. Elements, constraints and tied contacts of the deck connect these parts neither directly nor through other
+    parts, so they move separately in the reference run. A flying part that is merged into a rigid ground does not fly.
+    d2rpick does not apply this rule if it cannot read some of the elements or ties.
 
     Fix: Correct LRB (`--merge` of the card): name the *MAT_RIGID part to which the switched parts are attached, or one
     of the switched parts.

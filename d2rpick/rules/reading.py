@@ -88,7 +88,7 @@ def _make_elements(keyword: str) -> Example:
     ]
 )
 @make_rule_decorator(
-    "D2R001", ERROR, "the lines after a card do not match its D2R and R2D counts"
+    "D2R001", ERROR, "lines after a card that do not match its D2R and R2D counts"
 )
 def _check_counts(case: Case) -> Iterator[PlacedMessage]:
     """The second line of *DEFORMABLE_TO_RIGID_AUTOMATIC gives the number of D2R lines (D2R) and of R2D lines (R2D) that
@@ -204,7 +204,7 @@ def _find_unreadable_members(case: Case) -> Iterator[Problem]:
     ]
 )
 @make_rule_decorator(
-    "D2R003", ERROR, "an include file is missing or cannot be read", BOTH
+    "D2R003", ERROR, "an include file that is missing or cannot be read", BOTH
 )
 def _check_includes(case: Case) -> Iterator[PlacedMessage]:
     """d2rpick looks for include files in the folder of the main deck, in the folders of *INCLUDE_PATH and in the folder
@@ -234,7 +234,7 @@ def _check_includes(case: Case) -> Iterator[PlacedMessage]:
 @make_rule_decorator(
     "D2R109",
     WARNING,
-    "a parameter used by a card is defined twice with different values",
+    "a parameter of a card that is defined twice with different values",
 )
 def _check_parameters(case: Case) -> Iterator[PlacedMessage]:
     """By default LS-DYNA warns and keeps the first definition. *PARAMETER_DUPLICATION and *PARAMETER_MUTABLE change
@@ -276,7 +276,7 @@ def _check_parameters(case: Case) -> Iterator[PlacedMessage]:
 @set_passing(lambda: [_make_transformed("1.0"), _make_transformed("0.0")])
 @set_failing(lambda: [_make_transformed("0.5")])
 @make_rule_decorator(
-    "D2R110", WARNING, "the card is in a transformed include whose FCTTIM is not 1"
+    "D2R110", WARNING, "a card in a transformed include whose FCTTIM is not 1"
 )
 def _check_time_factor(case: Case) -> Iterator[PlacedMessage]:
     """*INCLUDE_TRANSFORM multiplies the times of the included file by FCTTIM (0 is read as 1). d2rpick applies this
@@ -326,12 +326,13 @@ def _report_encrypted(case: Case) -> Iterator[PlacedMessage]:
     ]
 )
 @make_rule_decorator(
-    "D2R011", WARNING, "a file of the deck seems to be truncated", BOTH
+    "D2R011", WARNING, "a file of the deck that seems to be truncated", BOTH
 )
 def _check_truncation(case: Case) -> Iterator[PlacedMessage]:
     """A file seems to be truncated if it has no *END (Radioss: /END) and its last line has no line end. A main deck
     without *END whose last lines are nodes or elements may be truncated too. The last number may be incomplete, and
-    switching cards, parts or parameters may be missing. d2rpick parts computes no cost from a truncated mesh.
+    switching cards, parts or parameters may be missing. The command d2rpick parts computes no cost from a truncated
+    mesh.
 
     Fix: Copy or write the file again. If the file is complete, add *END (Radioss: /END), or end the last line with a
     line break.

@@ -188,7 +188,7 @@ def _check_order(case: RunCase) -> Iterator[PlacedMessage]:
 @make_rule_decorator(
     "D2R402",
     ERROR,
-    "/RBODY/ON or /RBODY/OFF lists a node that is not a main node",
+    "a node in /RBODY/ON or /RBODY/OFF that is not a main node",
     (RADIOSS,),
 )
 def _check_main_nodes(case: RunCase) -> Iterator[PlacedMessage]:

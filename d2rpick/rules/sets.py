@@ -78,7 +78,7 @@ _with_floor = partial(_make_force_deck, contact=_FLOOR)
 @set_failing(
     lambda: [make_deck(THERE + write_automatic_card(1, "0.09", deformable=["1"]))]
 )
-@make_rule_decorator("D2R004", ERROR, "SWSET used twice")
+@make_rule_decorator("D2R004", ERROR, "a SWSET used twice")
 def _check_unique_ids(case: Case) -> Iterator[PlacedMessage]:
     """Each *DEFORMABLE_TO_RIGID_AUTOMATIC is a switch set with its own id, to which RELSW refers.
 
@@ -256,7 +256,7 @@ def _find_force_headers(case: Case, codes: set[int]) -> Iterator[SwitchHeader]:
     ]
 )
 @make_rule_decorator(
-    "D2R007", ERROR, "ENTNO names no contact or rigid wall of the deck"
+    "D2R007", ERROR, "an ENTNO that names no contact or rigid wall of the deck"
 )
 def _check_entity_exists(case: Case) -> Iterator[PlacedMessage]:
     """CODE 2 and 4 wait for the force of contact ENTNO, and CODE 1 and 3 wait for the force of rigid wall ENTNO. A
@@ -303,13 +303,13 @@ def _check_entity_exists(case: Case) -> Iterator[PlacedMessage]:
     ]
 )
 @make_rule_decorator(
-    "D2R008", ERROR, "ENTNO names a contact whose force cannot trigger a switch"
+    "D2R008", ERROR, "an ENTNO that names a contact whose force cannot trigger a switch"
 )
 def _check_entity_triggers(case: Case) -> Iterator[PlacedMessage]:
     """Only the force of surface-to-surface and nodes-to-surface contacts triggers a switch. A contact of type GENERAL
     or SINGLE_SURFACE never triggers a switch, so the part keeps its state, and the solver issues no message. Source:
-    Vol I, Remark 1, as quoted by a public drop tool, and the vendor's help on OFFSET, which lists the same types. Not
-    tested with the solver.
+    LS-DYNA manual, Vol I, *DEFORMABLE_TO_RIGID_AUTOMATIC, Remark 1, as quoted by a public drop tool, and the vendor's
+    help on OFFSET, which lists the same types. Not tested with the solver.
 
     Fix: Define a surface-to-surface or nodes-to-surface contact for the impact, and set ENTNO to its id.
     """
@@ -424,7 +424,7 @@ def _make_delayed_deck(wait: str) -> Example:
         _make_delayed_deck("0.0"),
     ]
 )
-@make_rule_decorator("D2R009", WARNING, "TIME3 is 0 with a contact CODE")
+@make_rule_decorator("D2R009", WARNING, "TIME3 0 together with a contact CODE")
 def _check_delay(case: Case) -> Iterator[PlacedMessage]:
     """TIME3 is the time after a switch during which the set makes no further switch. A contact force begins and ends
     many times in one impact, so with TIME3 = 0 the parts switch back and forth. In a pair, one of the two sets needs a

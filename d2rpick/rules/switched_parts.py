@@ -127,8 +127,8 @@ def _has_unknown_members(case: Case, *, to_rigid: bool) -> bool:
     "D2R103", ERROR, "a part switched back although no card made it rigid"
 )
 def _check_never_rigid(case: Case) -> Iterator[PlacedMessage]:
-    """An R2D line for a part that no D2R line has made rigid before has no effect. Usually a part id is wrong on one of
-    the two cards.
+    """An R2D line has no effect on a part that no earlier D2R line made rigid. Usually a part id is wrong on one of the
+    two cards.
 
     Fix: Add the D2R line, correct the part id, or remove the R2D line.
     """
@@ -224,7 +224,7 @@ def _check_never_back(case: Case) -> Iterator[PlacedMessage]:
 @make_rule_decorator(
     "D2R106",
     ERROR,
-    "part or part set not in the deck (only if every include file was read)",
+    "a part or part set that is not in the deck (only if every include file was read)",
 )
 def _check_ids_exist(case: Case) -> Iterator[PlacedMessage]:
     """A switching card names a part, part set or lead part that no *PART or *SET_PART defines, or a part set without

@@ -72,7 +72,7 @@ _WITHOUT_END: Final = HEAD.replace("*CONTROL_TERMINATION\n       0.2\n", "")
         ),
     ]
 )
-@make_rule_decorator("D2R101", ERROR, "switch time outside [0, ENDTIM)")
+@make_rule_decorator("D2R101", ERROR, "a switch time outside [0, ENDTIM)")
 def _check_times_in_run(case: Case) -> Iterator[PlacedMessage]:
     """TIME1 is the switching time for CODE 0, and the earliest switching time for CODE 1 to 4. If TIME1 is at or after
     ENDTIM of *CONTROL_TERMINATION, the set never switches. With CODE 1 to 4 it does not switch after TIME2 either.
@@ -171,7 +171,7 @@ def _check_times_in_order(case: Case) -> Iterator[PlacedMessage]:
 @set_passing(lambda: [PASS, make_window("0.0", "0.09")])
 @set_failing(lambda: [make_window("0.0", "0.0")])
 @make_rule_decorator(
-    "D2R105", ERROR, "both times of a window are 0 (decimals lost in writing)"
+    "D2R105", ERROR, "a window whose times are both 0 (decimals lost in writing)"
 )
 def _check_zero_times(case: Case) -> Iterator[PlacedMessage]:
     """Programs that print times with one decimal write every time below 0.05 as 0.0. Two sets that both switch at 0 are
@@ -198,13 +198,14 @@ def _check_zero_times(case: Case) -> Iterator[PlacedMessage]:
 @make_rule_decorator(
     "D2R111",
     WARNING,
-    "*DATABASE_GLSTAT/_MATSUM missing, or their DT above (td-tr)/200",
+    "a missing *DATABASE_GLSTAT/_MATSUM, or a DT above (td-tr)/200",
 )
 def _check_sampling(case: Case) -> Iterator[PlacedMessage]:
     """Switching times are chosen from the internal energy of a reference run: glstat contains the energy of the whole
     model, and matsum contains the energy of each part. If the output interval is too long, the energy at tr and td is
-    not known well enough. verify --switched compares a switched run with its reference run by means of this output, so
-    the rule also applies to checks with --history. It does not apply to decks that contain only switching cards.
+    not known well enough. The command d2rpick verify --switched compares a switched run with its reference run by means
+    of this output. So the rule also applies to checks with --history. It does not apply to decks that contain only
+    switching cards.
 
     Fix: Add *DATABASE_GLSTAT and *DATABASE_MATSUM with a DT of at most 1/200 of the shortest rigid window.
     """
@@ -275,7 +276,7 @@ def _find_timed(case: Case) -> list[tuple[SwitchSet, SwitchHeader]]:
     ]
 )
 @make_rule_decorator(
-    "D2R114", ERROR, "all switching times are equal (decimals lost in writing)"
+    "D2R114", ERROR, "switching times that are all equal (decimals lost in writing)"
 )
 def _check_equal_times(case: Case) -> Iterator[PlacedMessage]:
     """Programs that print times with one decimal write 0.0 for every time below 0.05, and 0.1 for 0.07 and 0.13. If all
@@ -342,7 +343,7 @@ def _find_mixed_units(times: list[float], end: float, run_end: str) -> str | Non
 @make_rule_decorator(
     "D2R115",
     ERROR,
-    "the switching times are about 1000 times the termination time, or 1/1000 of it",
+    "switching times of about 1000 times the termination time, or 1/1000 of it",
 )
 def _check_units_of_deck(case: Case) -> Iterator[PlacedMessage]:
     """The deck seems to mix seconds and milliseconds. The switching times lie outside the run or in its first 1/1000,
@@ -400,7 +401,7 @@ def _report_faults(case: Case, rule_id: str) -> Iterator[PlacedMessage]:
 @make_rule_decorator(
     "D2R206",
     WARNING,
-    "deck and history seem to have different time units (their ends differ by a power of 1000)",
+    "a deck and a history that seem to have different time units (their ends differ by a power of 1000)",
     BOTH,
 )
 def _check_units_of_history(case: Case) -> Iterator[PlacedMessage]:
@@ -436,7 +437,7 @@ def _check_units_of_history(case: Case) -> Iterator[PlacedMessage]:
 @make_rule_decorator(
     "D2R207",
     ERROR,
-    "the switching times are about 1000 times the times in the history, or 1/1000 of them",
+    "switching times of about 1000 times the times in the history, or 1/1000 of them",
     BOTH,
 )
 def _check_times_of_history(case: Case) -> Iterator[PlacedMessage]:
@@ -471,7 +472,7 @@ def _check_times_of_history(case: Case) -> Iterator[PlacedMessage]:
     ]
 )
 @make_rule_decorator(
-    "D2R201", ERROR, "the error of the frozen deformation is above --tolerance", BOTH
+    "D2R201", ERROR, "an error of the frozen deformation above --tolerance", BOTH
 )
 def _check_locked_in_error(case: Case) -> Iterator[PlacedMessage]:
     """While a part is rigid, it keeps the deformation that it had at tr, and it springs back at td. This deformation
@@ -487,7 +488,7 @@ def _check_locked_in_error(case: Case) -> Iterator[PlacedMessage]:
 @set_passing(lambda: [_make_good_pair()])
 @set_failing(lambda: [_make_pair_deck(".0122659", "0.064")])
 @make_rule_decorator(
-    "D2R202", ERROR, "the deformations at tr and td have opposite directions", BOTH
+    "D2R202", ERROR, "deformations at tr and td that have opposite directions", BOTH
 )
 def _check_sign(case: Case) -> Iterator[PlacedMessage]:
     """In each oscillation cycle a part passes every energy level twice in tension and twice in compression. If the
@@ -504,7 +505,7 @@ def _check_sign(case: Case) -> Iterator[PlacedMessage]:
 @make_rule_decorator(
     "D2R203",
     WARNING,
-    "poor td: more than half of the vibration energy is kinetic",
+    "a poor td, at which more than half of the vibration energy is kinetic",
     BOTH,
 )
 def _check_kinetic_share(case: Case) -> Iterator[PlacedMessage]:
@@ -551,14 +552,16 @@ def _check_limits(case: Case) -> Iterator[PlacedMessage]:
 @set_passing(lambda: [_make_good_pair()])
 @set_failing(lambda: [_make_pair_deck(*_GOOD_PAIR, "--after 0.03")])
 @make_rule_decorator(
-    "D2R204", ERROR, "tr before the load is over, or td after the next contact", BOTH
+    "D2R204",
+    ERROR,
+    "a tr before the load is over, or a td after the next contact",
+    BOTH,
 )
 def _check_flight(case: Case) -> Iterator[PlacedMessage]:
     """If tr lies before the end of the load, an equal energy is a coincidence, and the motion of the body is wrong. If
     td lies after the next contact, a rigid part does not deform in this contact. d2rpick finds the start and end of the
-    flight from the momentum or the energy in the history, or uses the time of --after. It also reports a history that
-    does not show the flight. It also reports a part that cannot fly because of a support or a prescribed motion in the
-    deck.
+    flight from the momentum or the energy in the history, or uses the time of --after. The rule also reports a problem
+    if the history shows no flight, or if a support or a prescribed motion in the deck prevents a part from flying.
 
     Fix: Move tr after the load and td before the next contact. If the history does not show when the load ends, give
     --after.
@@ -569,12 +572,12 @@ def _check_flight(case: Case) -> Iterator[PlacedMessage]:
 @set_passing(lambda: [_make_good_pair()])
 @set_failing(lambda: [_make_pair_deck(".0135867", "0.16")])
 @make_rule_decorator(
-    "D2R205", ERROR, "time or part that the history does not contain", BOTH
+    "D2R205", ERROR, "a time or part that the history does not contain", BOTH
 )
 def _check_in_history(case: Case) -> Iterator[PlacedMessage]:
-    """The history gives no energy at times outside its record, and no energy of a part that it does not contain. A td
-    within the first ten states seems to have another unit if 1000 times this td lies in the history. d2rpick reports
-    such a td too.
+    """The history gives no energy at times outside its record, and no energy of a part that it does not contain. If td
+    lies within the first ten states and 1000 times td lies in the history, td seems to be in another unit. d2rpick
+    reports such a td too.
 
     Fix: Correct the time or the part id, or extend the reference run.
     """

@@ -396,7 +396,7 @@ def test_rules_are_listed() -> None:
     lines = run("rule").stdout.splitlines()
     assert [line.split()[0] for line in lines] == list(RULES)
     assert (
-        "D2R105  error    both times of a window are 0 (decimals lost in writing)"
+        "D2R105  error    a window whose times are both 0 (decimals lost in writing)"
         in lines
     )
 

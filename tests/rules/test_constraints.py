@@ -80,7 +80,7 @@ def test_parts_that_only_the_constraint_connects_do_not_separate_unseen(
     """
     constraint = CONSTRAINTS[kind]
     apart = find_constraint_findings(tmp_path, constraint, ["1", "2"])
-    separate = "become separate rigid bodies (D2R121): merge them by LRB"
+    separate = "become separate rigid bodies (D2R121): merge them with LRB"
     assert [separate in finding.message for finding in apart] == [True] * (
         kind != "joint"
     )
