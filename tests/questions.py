@@ -46,7 +46,7 @@ PAGES: Final = {
     },
     "model-faq": {
         "faq-models": "Model",
-        "faq-usual": "Usual cases",
+        "faq-usual": "Typical cases",
         "faq-options": "Solver options and loads",
         "faq-special": "Special cases",
     },

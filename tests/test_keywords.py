@@ -8,6 +8,7 @@ from tests.examples import make_anchor, read_page
 from tests.questions import Question, list_questions
 
 PAGE = "docs/reference/keywords.md"
+WARNINGS = "docs/reference/warnings.md"
 ROWS = re.findall(r"^\| \[(.+?)\]\((.+?)\) \| (.+) \|$", read_page(PAGE), re.MULTILINE)
 LONGEST_SHORT_ANSWER = 20  # [words]
 TYPED_BY_ANALYSTS = """
@@ -17,7 +18,9 @@ TYPED_BY_ANALYSTS = """
     nodal rigid body; nodout; oscillation; output interval; plastic strain; plateau; preload; rebound; restart; ringing;
     rollover; rotation; sampling rate; second impact; section force; sensor; Slurm; sloshing; spotweld; springback;
     time saving; time step; ton mm s; tyre; UMAT; verdict; wheel; Windows; --after; --done; --landing; --margin;
-    --min-quality; --step-cap; --write-deck; /FAIL; /SECT; *CONTROL_TERMINATION; *MAT_RIGID; *SET_PART; HIC; pre-commit
+    belt; changed part id; energy rises; FMVSS; initial speed; load case; quasi-static; second flight; seat belt;
+    spot weld; td fixed; two flights; ±; --min-quality; --step-cap; --write-deck; /FAIL; /SECT; *CONTROL_TERMINATION;
+    *MAT_RIGID; *SET_PART; HIC; pre-commit
 """
 
 
@@ -48,3 +51,10 @@ def test_a_word_that_analysts_type_is_found(word: str) -> None:
 def test_every_frequent_question_has_a_row(question: Question) -> None:
     answer = f"../how-to/{question.page}.md#{make_anchor(question.title)}"
     assert answer in {target for _, target, _ in ROWS}
+
+
+@pytest.mark.parametrize(
+    "code", re.findall(r"^### (.+)$", read_page(WARNINGS), re.MULTILINE)
+)
+def test_a_warning_code_is_found(code: str) -> None:
+    assert any(code in re.split(r"[`, ]+", words) for words, _, _ in ROWS)

@@ -179,7 +179,9 @@ class Output:
         text = answer.text(self.output_format, now)
         if now.question.unused_deck and self.output_format in IN_WORDS:
             deck = make_printable(now.question.unused_deck)
-            text = f"answer without {deck}, which is not the deck of this run\n{text}"
+            text = (
+                f"{deck} was not used, because it is not the deck of this run\n{text}"
+            )
         if below:
             text = f"{text}\n\n{below}"
         self.result(name_options_and_wrap(text, self.output_format, now.width))

@@ -249,7 +249,8 @@ def copy_files(
             yield relative, source.read(0)
         elif not is_absolute:
             raise DeckError(
-                f"{file}: the deck includes it by a relative path from outside its folder; copy it into the folder"
+                f"{file}: the deck includes it by a relative path from outside its folder; write an absolute path, or "
+                "copy it into the folder"
             )
 
 

@@ -86,7 +86,9 @@ def as_table(checks: Checks, display: DisplayOptions) -> str:
     lines = [line for result in checks.results for line in _format_deck(checks, result)]
     decision, step = [], []
     if checks.results and not display.written_deck:
-        decision = tables.format_in_line(_decide_on_deck(checks))
+        decision = tables.format_in_line(
+            [*_list_failed(checks), *_decide_on_deck(checks)]
+        )
         step = [f"next  {_name_next_step(checks)}"]
     return "\n".join(
         [*decision, *map(make_printable, lines), "", *step, summarize_findings(checks)]
@@ -95,7 +97,11 @@ def as_table(checks: Checks, display: DisplayOptions) -> str:
 
 def _format_many_decks(checks: Checks) -> str:
     """Return the decision on several decks and the next step, the decks from the worst to the best, and a summary."""
-    head = [*_list_decision(checks), ("next", _name_next_step(checks))]
+    head = [
+        *_list_failed(checks),
+        *_list_decision(checks),
+        ("next", _name_next_step(checks)),
+    ]
     silent = [
         format_path(result.deck, checks.root)
         for result in checks.results
@@ -120,6 +126,19 @@ def _format_many_decks(checks: Checks) -> str:
             summarize_findings(checks),
         ]
     )
+
+
+def _list_failed(checks: Checks) -> list[tuple[str, str]]:
+    """Return how many decks could not be checked, and their names; empty if there are none."""
+    if not checks.failed:
+        return []
+    count = len(checks.failed)
+    names = list_names(
+        [format_path(failed.deck, checks.root) for failed in checks.failed],
+        most=_MOST_SILENT,
+    )
+    total = count + len(checks.results)
+    return [("failed", f"{count} of {total} decks could not be checked: {names}")]
 
 
 def _decide_on_deck(checks: Checks) -> list[tuple[str, str]]:

@@ -116,7 +116,7 @@ def name_step_to_deck(question: RepeatedQuestion, then: str = "") -> str:
         words, hint = ("--deck", deck.name), deck.hint
     words = (*question.times, *words, "--write-deck", _FOLDER)
     line = write_command(_allow_deck(question), "plan", *words)
-    action = f"write a copy of the deck with the cards, and run it in {_FOLDER} from t = 0{then}"
+    action = f"write a copy of the deck with the cards, and run it in the folder {_FOLDER} from t = 0{then}"
     return f"{action}. This writes the copy: {line}{hint}"
 
 

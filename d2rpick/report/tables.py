@@ -24,8 +24,12 @@ _LEAST: Final = 12
 _PLAIN_ON_WINDOWS: Final = r"[\w./\\:=+-]+"
 # _ARGUMENT: pattern of an argument as `quote_shell_line` writes it.
 # _COMMAND: pattern of a command in a sentence, with at least one argument, to the end of the clause.
+# _FOLDER: pattern of an argument that names the current folder or the one above it.
+_FOLDER: Final = r"\.{1,2}"
 _ARGUMENT: Final = r"""(?:\$'(?:\\.|[^'\\])*'|'[^']*'|"[^"]*"|[^\s'"()])+"""
-_COMMAND: Final = rf"\bd2rpick [a-z]+(?: {_ARGUMENT}(?<![.,;:]))*(?: {_ARGUMENT})"
+_COMMAND: Final = (
+    rf"\bd2rpick [a-z]+(?: (?:{_FOLDER}(?!\S)|{_ARGUMENT}(?<![.,;:])))*(?: {_ARGUMENT})"
+)
 # Beginning of a line whose text tells what to do next.
 _NEXT: Final = r"next(?=  )|next(?=: )"
 # _NUMBER: pattern of a number, which is not treated as a spreadsheet formula.
@@ -268,10 +272,14 @@ def split_at_commands(text: str) -> Iterator[tuple[str, bool]]:
     --------
     >>> list(split_at_commands("look with d2rpick info 'my run.csv' (the run)"))
     [('look with ', False), ("d2rpick info 'my run.csv'", True), (' (the run)', False)]
+    >>> list(split_at_commands("look with d2rpick verify --switched . run.csv"))
+    [('look with ', False), ('d2rpick verify --switched . run.csv', True), ('', False)]
     """
     end = 0
     for match in re.finditer(_COMMAND, text):
-        command = match[0].rstrip(".,;:")
+        command = match[0]
+        if not re.search(rf" {_FOLDER}$", command):
+            command = command.rstrip(".,;:")
         yield text[end : match.start()], False
         yield command, True
         end = match.start() + len(command)

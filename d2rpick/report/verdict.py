@@ -136,7 +136,7 @@ def list_next_step(
     situation = answer.situation
     if answer.is_of_other_run:
         line = write_command(question, "info")
-        step = f"look at both runs, each with such a command: {line} (for the reference run)"
+        step = f"look at the reference run, and at the switched run in the same way: {line}"
     elif answer.is_of_other_times:
         line = write_command(question, "verify", *_leave_out_times(question.times))
         step = f"compare the window of the switched run with {line}"

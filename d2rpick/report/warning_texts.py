@@ -57,8 +57,8 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "Keep td before the time that the warning gives.",
         ),
         "margin-kept": Explanation(
-            "td could be later, but d2rpick keeps a margin before the next contact, because switching may advance "
-            "this contact.",
+            "td could be later, but d2rpick keeps a margin before the next contact, because switching may make "
+            "this contact earlier.",
             "Nothing to do. To change the margin, use --margin.",
         ),
         "no-flight": Explanation(

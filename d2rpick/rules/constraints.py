@@ -365,12 +365,11 @@ def _check_separated_parts(case: Case) -> Iterator[PlacedMessage]:
     "extra nodes, a joint or a weld that stays active on a switched part (NRBF, NCSF)",
 )
 def _check_other_constraints(case: Case) -> Iterator[PlacedMessage]:
-    """Extra nodes, joints, spotwelds, rivets, generalized welds and constrained node sets constrain nodes. On a part
-    that a card makes rigid, these nodes also belong to its rigid body. According to the vendor, such constraints are
-    invalid for a rigid body: they must be deleted while the part is rigid, and activated again when it is switched
-    back. NCSF deletes spotwelds and other nodal constraints, such as rivets and constrained node sets. NRBF deletes
-    generalized welds. No available source states which flag deletes joints and extra nodes, so NRBF 1 or NCSF 1
-    satisfies this rule. A joint between separate rigid bodies may stay active, and is not reported.
+    """According to the vendor, such a constraint is invalid for a rigid body, because its nodes also belong to that
+    body. It must be deleted while the part is rigid, and activated again when the part is switched back. NCSF deletes
+    spotwelds, rivets and constrained node sets. NRBF deletes generalized welds. No available source states which flag
+    deletes joints and extra nodes: for these, the rule accepts either flag. A joint between separate rigid bodies may
+    stay active, and is not reported.
 
     Fix: Set the flag to 1 on the card that makes the part rigid and to 2 on the card that switches it back: NCSF for
     spotwelds, rivets and node sets, NRBF for generalized welds. For joints and extra nodes, set NCSF, and NRBF too if

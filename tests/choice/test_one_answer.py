@@ -151,7 +151,7 @@ def test_verify_and_check_name_the_same_ends_of_a_flight(box: Reference) -> None
     verdict = verify_in_history(
         box.history, flight.start + 0.005, flight.end - 0.005, settings
     )
-    reasons = [reason for reason in verdict.reasons if "with the margin" in reason]
+    reasons = [reason for reason in verdict.reasons if "s the margin" in reason]
     messages = [
         fault.message for fault in find_faults(verdict) if fault.rule == "D2R204"
     ]

@@ -217,7 +217,7 @@ def test_an_unlike_run_is_the_first_reason_against_a_given_pair(tmp_path: Path) 
     )
     assert "to improve give the switched run of this model" in text
     assert (
-        f"next look at both runs, each with such a command: d2rpick info {reference}"
+        f"next look at the reference run, and at the switched run in the same way: d2rpick info {reference}"
         in text
     )
 

@@ -729,7 +729,7 @@ def test_td_after_the_next_contact_is_named_at_td() -> None:
         assert [
             (f["rule"], f["line"])
             for f in check_report
-            if "after the end of the flight" in f["message"]
+            if "after the last td of the flight" in f["message"]
         ] == expected
 
 
@@ -839,6 +839,7 @@ def test_a_check_without_a_history_says_that_it_has_judged_no_times() -> None:
         ),
         ((DECK, "--history", GLSTAT), "found  1 error and 1 warning"),
         (("none.k",), "passed  no errors or warnings"),
+        (("none.k", "absent.k"), "failed  1 of 2 decks could not be checked: absent.k"),
     ],
 )
 def test_the_first_line_says_what_was_found_in_one_deck(

@@ -178,7 +178,7 @@ def test_nothing_before_the_end_of_the_load_and_the_margin_is_acceptable(
     )
     early = [c["notes"][0] for c in document["candidates"] if c["tr"] <= 0.02]
     assert early
-    assert all("before the end of the load" in note for note in early)
+    assert all("end of the load" in note for note in early)
     assert (
         run_json("verify", "--tr", "0.0128853", "--td", "0.064", *options, ENERGY)[
             "tr_ok"

@@ -231,7 +231,7 @@ def test_a_deck_of_another_model_that_was_given_is_an_objection(
     assert (alone.exit_code, result.exit_code) == (0, 1)
     assert result.stdout.endswith(alone.stdout)
     first_line = result.stdout.removesuffix(alone.stdout)
-    expected = f"answer without {deck}, which is not the deck of this run"
+    expected = f"{deck} was not used, because it is not the deck of this run"
     assert " ".join(first_line.split()) == expected
     assert f"exit code 1: {deck} was not used" in result.stderr
     assert run(*arguments, "--deck", str(deck), "--exit-zero", MATSUM).exit_code == 0

@@ -316,7 +316,11 @@ def _describe_not_predicted(
 
 def describe_end_of_load(situation: Situation) -> str:
     """Describe ``earliest_tr`` in words: the start of the flight, plus the margin if there is one."""
-    return f"the end of the load at {situation.flight.start:.6g}{_describe_margin(situation.settings.margin)}"
+    start, margin = situation.flight.start, situation.settings.margin
+    load = f"the end of the load at {start:.6g}"
+    if not margin or start is None:
+        return load
+    return f"the first tr of the flight, {start + margin:.6g} ({load} plus the margin {margin:.6g})"
 
 
 def describe_end_of_flight(situation: Situation) -> str:
@@ -325,14 +329,12 @@ def describe_end_of_flight(situation: Situation) -> str:
     cause = ""
     if any(start == end for start, _ in situation.history.holes):
         cause = ", where the states stop (is a restart segment missing?)"
+    if not situation.margin:
+        return f"the end of the flight at {end:.6g}{cause}"
+    last = f"the last td of the flight, {round_down_as_read(situation.latest_td):.6g}"
     return (
-        f"the end of the flight at {end:.6g}{cause}{_describe_margin(situation.margin)}"
+        f"{last} (its end at {end:.6g}{cause} minus the margin {situation.margin:.6g})"
     )
-
-
-def _describe_margin(margin: float | None) -> str:
-    """Describe a margin in words; empty if there is no margin."""
-    return f" with the margin {margin:.6g}" if margin else ""
 
 
 def _describe_nearest_flight(situation: Situation) -> str:
@@ -342,9 +344,9 @@ def _describe_nearest_flight(situation: Situation) -> str:
         return ""
     if flight.end is None:
         return f"; the next flight begins at {flight.start:.6g}"
-    margin = _describe_margin(situation.margin)
-    if margin:
-        last = f";{margin} its last td is {round_down_as_read(situation.latest_td):.6g}"
+    if situation.margin:
+        latest_td = round_down_as_read(situation.latest_td)
+        last = f"; because of the margin {situation.margin:.6g}, its last td is {latest_td:.6g}"
     else:
         last = "; td must lie in it"
     return f"; the nearest flight is {format_window(flight.start, flight.end)}{last}"

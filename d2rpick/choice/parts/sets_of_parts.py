@@ -263,7 +263,8 @@ def recommend_parts(
             reasons += part_set.reasons
         why = "; ".join(dict.fromkeys(reasons)) or "no part may be switched"
         raise FormatError(
-            f"{run.name}: no set of parts can be recommended ({why}); name the parts"
+            f"{run.name}: no set of parts can be recommended ({why}); see the reasons with d2rpick parts, or name the "
+            "parts by their ids"
         )
     return answer.recommended.parts
 
