@@ -49,7 +49,7 @@ def card(
 ) -> None:
     """Print solver input for rigid windows, ready to be pasted.
 
-    With a history, d2rpick judges the times as printed, and adds the verdict as a comment.  With the deck of the run,
+    With a history, d2rpick judges the times as printed and adds the verdict as a comment.  With the deck of the run,
     it merges parts that share nodes, and checks the deck with the card in it.  --deck also works without --history.
 
     Examples

@@ -94,7 +94,7 @@ def replay(motion: Motion, output: Output) -> None:
 def rollover(box: Box, output: Output) -> None:
     """Simulate a planar box (SI units) that trips over the curb of a braking sled and rolls, or that falls and bounces.
 
-    The box is deformable throughout, or rigid from each tr to its td.  The step that meets the curb stays deformable,
+    The box is deformable throughout, or rigid from each tr to its td.  The step that meets the curb stays deformable
     or is switched together with the box (--with-step). The columns are time, position, roll, velocities and energies of
     the box, the momentum of box and step, and the energy balance of the model.  A glstat contains the energies of the
     model, and a matsum contains the energies of each part.

@@ -76,7 +76,7 @@ def suggest(
     If you omit --td, d2rpick chooses both times, in --td-window or in the longest flight.
 
     A candidate is a time before td at which the parts have nearly the same deformation as at td.  d2rpick judges each
-    candidate by the vibration model that fits the record.  It recommends the best candidate, and names a better td if
+    candidate by the vibration model that fits the record.  It recommends the best candidate and names a better td if
     there is one.
 
     Examples

@@ -63,7 +63,7 @@ if TYPE_CHECKING:
 ))  # fmt: skip
 @options.add_options(
     *(*READING, *CHOOSING_FOR_SETS, "plot", "report", *RESULT),
-    plot="Plot the energies of all runs, and write the figure to FILE (png, svg, pdf).",
+    plot="Plot the energies of all runs and write the figure to FILE (png, svg, pdf).",
     report="Write everything to one HTML page to read, print and sign.",
     forms=FORMATS["study"],
 )

@@ -26,7 +26,7 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "No force, momentum or energy balance shows the flight, so d2rpick inferred it from the internal energy. "
             "The end of the load may be wrong. If tr lies before the end of the load, the whole motion after tr is "
             "wrong.",
-            "Give the end of the load with --after, or write the part momenta in the next run.",
+            "Give the end of the load with --after or write the part momenta in the next run.",
         ),
         "flight-sources-disagree": Explanation(
             "Two kinds of evidence give different flights. d2rpick uses the later start and the earlier end, or the "
@@ -63,7 +63,7 @@ EXPLANATIONS_BY_TOPIC: Final = {
         ),
         "no-flight": Explanation(
             "Nothing in the record shows when the load ends, so d2rpick cannot recommend a tr.",
-            "If the parts never fly, do not switch them. If they fly, give the end of the load with --after, or write "
+            "If the parts never fly, do not switch them. If they fly, give the end of the load with --after or write "
             "the part momenta in the next run. Flights shorter than 5 % of the record are ignored.",
         ),
         "no-free-flight": Explanation(
@@ -75,7 +75,7 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "Neither the parts nor the motion of nodes shows how the body rotates in the flight. If you give the "
             "deck, d2rpick assumes the worst rotation that the kinetic energy allows, so the margin before the next "
             "contact may be large. Without the deck, the margin may be too short.",
-            "Give the deck with --deck, and write the motion of at least three nodes of the body that do not lie on "
+            "Give the deck with --deck and write the motion of at least three nodes of the body that do not lie on "
             "a line. In Radioss use /TH/NODE, in LS-DYNA use *DATABASE_HISTORY_NODE with the binout or nodout. "
             "Otherwise set the margin with --margin.",
         ),
@@ -99,7 +99,7 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "No peak of the energy in this flight has an admissible tr. A tr is admissible if it lies in the flight, "
             "the deformation has the same direction as at td, and the error is small enough. So d2rpick offers no "
             "other td.",
-            "Compare other values of td with d2rpick explore, or choose other parts.",
+            "Compare other values of td with d2rpick explore or choose other parts.",
         ),
         "no-candidate": Explanation(
             "No tr is admissible for this td: each candidate lies outside the flight, has a deformation of opposite "
@@ -109,7 +109,7 @@ EXPLANATIONS_BY_TOPIC: Final = {
         "flight-outside-record": Explanation(
             "The momenta show a flight that continues after the end of the energy record. The files may belong to "
             "different runs, or one of them was truncated.",
-            "Give the files of one run only, or copy the shorter file again.",
+            "Give the files of one run only or copy the shorter file again.",
         ),
         "no-energy": Explanation(
             "The internal energy at td is zero or negative, so there is no level to match.",
@@ -120,7 +120,7 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "A part that moves inside the body is frozen in the position that it has at tr. At td the body is "
             "displaced by the stated distance, which is more than 1 % of its path. The next contact may come earlier "
             "or later.",
-            "Leave the moving part deformable, or choose another tr. You may accept the displacement if no result "
+            "Leave the moving part deformable or choose another tr. You may accept the displacement if no result "
             "depends on the exact time and place of the next contact.",
         ),
         "partly-rigid": Explanation(
@@ -187,7 +187,7 @@ EXPLANATIONS_BY_TOPIC: Final = {
         ),
         "blew-up": Explanation(
             "The energies of the run grow without limit, so the run is unstable. d2rpick does not use the run.",
-            "Repair the model, and run it again.",
+            "Repair the model and run it again.",
         ),
         "contact-in-window": Explanation(
             "The contact energy changes inside the rigid window, so something is in contact. If the chosen parts are "
@@ -205,7 +205,7 @@ EXPLANATIONS_BY_TOPIC: Final = {
         ),
         "eroded-energy": Explanation(
             "Eroded elements contain a significant part of the internal energy. This energy is not released at td.",
-            "Name individual parts with --part, or use a history without the eroded energy.",
+            "Name individual parts with --part or use a history without the eroded energy.",
         ),
         "erosion": Explanation(
             "Elements erode inside the rigid window. If their parts are rigid, these elements do not erode.",
@@ -214,12 +214,12 @@ EXPLANATIONS_BY_TOPIC: Final = {
         "hourglass": Explanation(
             "The hourglass energy of the model is more than 10 % of the internal energy, so the internal energy is "
             "unreliable.",
-            "Use another hourglass control or element formulation, and run the model again.",
+            "Use another hourglass control or element formulation and run the model again.",
         ),
         "negative-sliding": Explanation(
             "The contact energy is strongly negative. This has no physical cause, so the energy balance is wrong by "
             "this amount.",
-            "Check the reference run for initial penetrations, and run it again.",
+            "Check the reference run for initial penetrations and run it again.",
         ),
         "nothing-to-judge": Explanation(
             "The internal energy is zero in all states, so there is nothing to judge.",
@@ -228,7 +228,7 @@ EXPLANATIONS_BY_TOPIC: Final = {
         "part-hourglass": Explanation(
             "The hourglass energy of a chosen part is more than 10 % of the internal energy of the part, so this "
             "internal energy is unreliable.",
-            "Use another hourglass control or element formulation for this part, and run the model again.",
+            "Use another hourglass control or element formulation for this part and run the model again.",
         ),
         "sliding": Explanation(
             "The contact energy is more than 10 % of the internal energy. Only friction can explain so large a contact "
@@ -254,7 +254,7 @@ EXPLANATIONS_BY_TOPIC: Final = {
         "body-through-wall": Explanation(
             "The Radioss starter removes nodes of a rigid body from a rigid wall, so the body can pass through the "
             "wall.",
-            "Correct the deck as rule D2R406 explains, and run it again.",
+            "Correct the deck as rule D2R406 explains and run it again.",
         ),
         "body-without-velocity": Explanation(
             "An initial velocity does not include the main node of a rigid body, so the body starts at rest.",
@@ -273,11 +273,11 @@ EXPLANATIONS_BY_TOPIC: Final = {
         "cost-unknown": Explanation(
             "d2rpick cannot estimate the CPU time; the warning gives the reason. The verdict on the pair does not "
             "depend on it.",
-            "Name the parts with --part and the deck with --deck, or give --cost-share.",
+            "Name the parts with --part and the deck with --deck or give --cost-share.",
         ),
         "deck-in-folder": Explanation(
             "The run folder contains one main deck, and d2rpick uses it: its gravity, loads, supports and parts.",
-            "Nothing to do if it is the deck of this run. Otherwise give another deck with --deck, or use --no-deck.",
+            "Nothing to do if it is the deck of this run. Otherwise give another deck with --deck or use --no-deck.",
         ),
         "deck-not-followed": Explanation(
             "d2rpick cannot evaluate an item of the deck, such as a curve or a sensor, and uses the history instead. "
@@ -298,7 +298,7 @@ EXPLANATIONS_BY_TOPIC: Final = {
         "loose-pieces": Explanation(
             "A part consists of pieces that nothing connects, for example four wheels. LS-DYNA makes one rigid body "
             "of them, so they move together.",
-            "Leave the part out, or give each piece its own part.",
+            "Leave the part out or give each piece its own part.",
         ),
         "merged-apart": Explanation(
             "--merge joins parts that nothing connects in the deck, so they move as one rigid body.",
@@ -346,7 +346,7 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "Give the deck with all its includes (--deck), or merge the parts with --merge.",
         ),
         "same-leg-twice": Explanation(
-            "d2rpick calibrate found the same restart segment or engine run twice, and counts it only once.",
+            "d2rpick calibrate found the same restart segment or engine run twice and counts it only once.",
             "Nothing to do.",
         ),
         "several-bodies": Explanation(
@@ -389,7 +389,7 @@ EXPLANATIONS_BY_TOPIC: Final = {
         "built-in-weights": Explanation(
             "Your weights lack some element formulations of the deck. For these, d2rpick uses the built-in weights, "
             "multiplied by the median ratio of your weights to the built-in weights.",
-            "Also calibrate with runs that contain these formulations (d2rpick calibrate), or add their weights under "
+            "Also calibrate with runs that contain these formulations (d2rpick calibrate) or add their weights under "
             "[per_element].",
         ),
     },
@@ -401,7 +401,7 @@ EXPLANATIONS_BY_TOPIC: Final = {
         "landed-rigid": Explanation(
             "In the switched run, a contact began or ended while the parts were rigid. The motion after this contact "
             "is wrong, and d2rpick plans nothing after it.",
-            "Choose an earlier td for this window, and run the model again.",
+            "Choose an earlier td for this window and run the model again.",
         ),
         "longer-window-later": Explanation(
             "A later flight allows a longer window than the window that is planned now. The later window needs a new "
@@ -432,7 +432,7 @@ EXPLANATIONS_BY_TOPIC: Final = {
         ),
         "mixed-bases": Explanation(
             "The basis is not the same in all runs, so the errors of the runs are not directly comparable.",
-            "Compare the verdicts, or write the same output in all runs.",
+            "Compare the verdicts or write the same output in all runs.",
         ),
         "mixed-models": Explanation(
             "The files of the runs contain different parts, or other titles of the same parts. A tr of one model means "

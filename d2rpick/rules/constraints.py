@@ -369,7 +369,7 @@ def _check_other_constraints(case: Case) -> Iterator[PlacedMessage]:
     body. It must be deleted while the part is rigid, and activated again when the part is switched back. NCSF deletes
     spotwelds, rivets and constrained node sets. NRBF deletes generalized welds. No available source states which flag
     deletes joints and extra nodes: for these, the rule accepts either flag. A joint between separate rigid bodies may
-    stay active, and is not reported.
+    stay active and is not reported.
 
     Fix: Set the flag to 1 on the card that makes the part rigid and to 2 on the card that switches it back: NCSF for
     spotwelds, rivets and node sets, NRBF for generalized welds. For joints and extra nodes, set NCSF, and NRBF too if
@@ -485,7 +485,7 @@ def _check_tied_contacts(case: Case) -> Iterator[PlacedMessage]:
     the vendor's public manual on tied contacts. Not tested with the solver.
 
     Fix: Switch both parts and merge them with LRB. If one of them has *MAT_RIGID, write its id as LRB of the other. If
-    one of them should stay deformable, add OFFSET to the contact, or keep both deformable.
+    one of them should stay deformable, add OFFSET to the contact or keep both deformable.
     """
     first = {event.unit.id: event for event in reversed(case.made_rigid)}
     if not first:

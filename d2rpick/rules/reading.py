@@ -93,9 +93,9 @@ def _make_elements(keyword: str) -> Example:
 def _check_counts(case: Case) -> Iterator[PlacedMessage]:
     """The second line of *DEFORMABLE_TO_RIGID_AUTOMATIC gives the number of D2R lines (D2R) and of R2D lines (R2D) that
     follow it, one line per part. If a count is wrong or a line is missing, the solver misreads the lines: it reads a
-    part from the wrong line, or treats a part line as the next card. If both counts are 0, the card switches no part.
+    part from the wrong line or treats a part line as the next card. If both counts are 0, the card switches no part.
 
-    Fix: Write one line per part, and set D2R and R2D to the number of these lines.
+    Fix: Write one line per part and set D2R and R2D to the number of these lines.
     """
     for card in case.sets:
         if card.count_problem:
@@ -350,7 +350,7 @@ def _report_disabled(case: Case) -> Iterator[PlacedMessage]:
     """All lines from *COMMENT to the next keyword are a comment, and so is the rest of the keyword line. A switching
     card in this block looks active but has no effect.
 
-    Fix: Remove *COMMENT to activate the card, or delete the card.
+    Fix: Remove *COMMENT to activate the card or delete the card.
     """
     for card in case.deck.disabled:
         yield (
@@ -376,7 +376,7 @@ def _report_untimed(case: Case) -> Iterator[PlacedMessage]:
     """CODE 1 to 4 switch by the force of a contact or rigid wall, and CODE 5 by a sensor. Restart cards switch when the
     restart begins, and plain cards at the start of the run. A Radioss body may be switched by a sensor other than
     /SENSOR/TIME. No time on such a card can be compared with an energy history. If the history contains the force of
-    the contact or wall, d2rpick finds the switching times from this force, and judges them. Part momenta are enough if
+    the contact or wall, d2rpick finds the switching times from this force and judges them. Part momenta are enough if
     the deck has only one contact or wall. d2rpick evaluates a *SENSOR_CONTROL if its *SENSOR_SWITCH depends on the
     time, or on the magnitude of a contact or wall force. It assumes that the parts are rigid while the sensor is on,
     and deformable while it is off; this was not tested with the solver. If you check restarts together with their main

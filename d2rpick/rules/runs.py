@@ -454,7 +454,7 @@ def _check_left_rigid(case: RunCase) -> Iterator[PlacedMessage]:
 )
 def _check_left_rigid_deforming(case: RunCase) -> Iterator[PlacedMessage]:
     """The rigid body is active from time 0 (D2R408), but its parts have internal energy in the history. They deform in
-    the reference run, and cannot deform in this run. If the history contains their energy and it is zero, the parts are
+    the reference run and cannot deform in this run. If the history contains their energy and it is zero, the parts are
     meant to be rigid, and d2rpick reports nothing.
 
     Fix: Add the main node to the /RBODY/OFF of every engine file.

@@ -114,7 +114,7 @@ def _check_pairs(case: Case) -> Iterator[PlacedMessage]:
     during the impact and deformable in flight. Source: vendor keyword data for the codes. For a long time, a public
     drop tool wrote decks in which CODE 2 and 4 were interchanged.
 
-    Fix: Let RELSW of each set name the other, and set PAIRED to 1 and -1. Use CODE 1 or 2 to make parts rigid, and CODE
+    Fix: Let RELSW of each set name the other and set PAIRED to 1 and -1. Use CODE 1 or 2 to make parts rigid, and CODE
     3 or 4 to make them deformable.
     """
     by_id = {header.swset.value: header for _, header in reversed(case.headers)}
@@ -311,7 +311,7 @@ def _check_entity_triggers(case: Case) -> Iterator[PlacedMessage]:
     LS-DYNA manual, Vol I, *DEFORMABLE_TO_RIGID_AUTOMATIC, Remark 1, as quoted by a public drop tool, and the vendor's
     help on OFFSET, which lists the same types. Not tested with the solver.
 
-    Fix: Define a surface-to-surface or nodes-to-surface contact for the impact, and set ENTNO to its id.
+    Fix: Define a surface-to-surface or nodes-to-surface contact for the impact and set ENTNO to its id.
     """
     headers = [
         header

@@ -156,7 +156,7 @@ def _check_never_rigid(case: Case) -> Iterator[PlacedMessage]:
 @make_rule_decorator("D2R117", ERROR, "a part made rigid and deformable in one restart")
 def _check_both_ways(case: Case) -> Iterator[PlacedMessage]:
     """*RIGID_DEFORMABLE_D2R and *RIGID_DEFORMABLE_R2D of one restart act together when the restart begins. A part on
-    both cards has no rigid window, or stays rigid to the end; no available source states which.
+    both cards has no rigid window or stays rigid to the end; no available source states which.
 
     Fix: Move one of the two cards to another restart.
     """
@@ -301,7 +301,7 @@ def _find_absent(line: Switched, parts: DeckParts) -> Iterator[tuple[str, int]]:
 def _check_always_rigid(case: Case) -> Iterator[PlacedMessage]:
     """A part with *MAT_RIGID is rigid from the start and cannot become deformable.
 
-    Fix: Leave the part out of the switched parts. If the part is meant to deform, give it a deformable material, and
+    Fix: Leave the part out of the switched parts. If the part is meant to deform, give it a deformable material and
     make it rigid with a D2R line.
     """
     back_events = [
@@ -439,7 +439,7 @@ def _check_unturned_stresses(case: Case) -> Iterator[PlacedMessage]:
     HA8). For LS-DYNA the rule follows from the theory of the formulations; sources disagree on what LS-DYNA does with
     the stresses.
 
-    Fix: Use a co-rotational formulation for these solids, or keep them deformable. If the part rotates little between
+    Fix: Use a co-rotational formulation for these solids or keep them deformable. If the part rotates little between
     tr and td, the error is small.
     """
     loaded = [

@@ -512,7 +512,7 @@ def _check_kinetic_share(case: Case) -> Iterator[PlacedMessage]:
     """A rigid part does not vibrate, so the kinetic part of the vibration energy at td is lost for every tr. Near a
     maximum of the internal energy, little vibration energy is kinetic. If D2R209 reports the pair, this rule does not.
 
-    Fix: Replace both times by the pair in the finding, or choose a td near a maximum of the internal energy.
+    Fix: Replace both times by the pair in the finding or choose a td near a maximum of the internal energy.
     """
     return _report_faults(case, "D2R203")
 
@@ -526,7 +526,7 @@ def _check_kinetic_share(case: Case) -> Iterator[PlacedMessage]:
 @set_failing(lambda: [_make_pair_deck(".0128853", "0.064")])
 @make_rule_decorator("D2R209", ERROR, "a pair with a grade below --min-quality", BOTH)
 def _check_quality(case: Case) -> Iterator[PlacedMessage]:
-    """The pair is admissible, but according to the history, the motion or the vibration after td will be wrong, or may
+    """The pair is admissible, but according to the history, the motion or the vibration after td will be wrong or may
     be wrong. d2rpick judges the pair in the same way as d2rpick verify. With --min-quality good, it also reports fair
     pairs; with --min-quality poor, it reports no pair.
 
