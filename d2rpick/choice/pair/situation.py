@@ -366,7 +366,7 @@ def _find_modes(
     return find_described(history, td, _get_quiet_window(history, quiet))
 
 
-class _Search(NamedTuple):
+class _VibrationSearch(NamedTuple):
     """A search for the vibration around ``td``, within ``bounds`` [time].
 
     ``is_shown`` is True if the evidence decides whether td is in a flight.
@@ -379,7 +379,7 @@ class _Search(NamedTuple):
 
 def _choose_search(
     history: History, td: float, seen: Seen, settings: Settings
-) -> _Search:
+) -> _VibrationSearch:
     """Choose where an oscillator is fitted to the energy.
 
     If td is not in a flight, the oscillator of the nearest flight shows which pairs exist in that flight. If only the
@@ -399,7 +399,7 @@ def _choose_search(
         elif seen.flight:
             fitted_at = (start + end) / 2
     bounds = limit_bounds(Span(start, end), fitted_at, settings.after, settings.landing)
-    return _Search(fitted_at, bounds, is_shown)
+    return _VibrationSearch(fitted_at, bounds, is_shown)
 
 
 def _check_times(history: History, td: float, settings: Settings) -> None:
