@@ -91,7 +91,7 @@ class Relation(NamedTuple):
 class Chosen(NamedTuple):
     """Values of an answer that are compared; None if unknown.
 
-    ``listed`` are all tr of the answer.  ``as_good`` are the listed and requested tr whose residual is that of the
+    ``listed`` are all acceptable tr of the answer.  ``as_good`` are the listed and requested tr whose residual is that of the
     chosen one within the ``+-`` of both.
     """
 
@@ -497,7 +497,7 @@ def choose(question: Asked, requested: Sequence[float] = ()) -> Chosen:
         grade,
         answer.basis,
         as_good,
-        tuple(candidate.tr for candidate in answer.candidates),
+        tuple(candidate.tr for candidate in answer.candidates if candidate.acceptable),
     )
 
 
