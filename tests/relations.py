@@ -91,8 +91,8 @@ class Relation(NamedTuple):
 class Chosen(NamedTuple):
     """Values of an answer that are compared; None if unknown.
 
-    ``listed`` are all acceptable tr of the answer.  ``as_good`` are the listed and requested tr whose residual is that of the
-    chosen one within the ``+-`` of both.
+    ``listed`` are the acceptable tr of the answer.  ``as_good`` are the tr, listed or requested, whose residual is that
+    of the chosen one within the ``+-`` of both.
     """
 
     tr: float | None
