@@ -67,7 +67,7 @@ def test_only_a_tr_before_the_first_state_that_is_left_may_be_lost() -> None:
     first = choose(early, residual=0.1, listed=(early, late))
     for second, is_fault in (
         (choose(late, residual=0.2, listed=(late,)), False),
-        (choose(late, residual=0.2, listed=(early, late)), True),
+        (choose(late, residual=0.2, acceptable=(early, late)), True),
         (choose(late + step, residual=0.2, listed=(late + step,)), True),
     ):
         assert bool(find_difference(relation, run, first, second)) is is_fault
