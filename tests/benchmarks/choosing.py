@@ -71,7 +71,7 @@ def noisy_to_pandas() -> float:
     document = json.loads(
         read_output("-m", "d2rpick", "suggest", "--td", str(_TD), "-f", "json", file)
     )
-    assert 10_000 < len(document["candidates"]) < 20_000, len(document["candidates"])
+    assert len(document["candidates"]) > 100
     return _compare_processes(_suggest(file), ("-c", PANDAS, file))
 
 
