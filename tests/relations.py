@@ -91,8 +91,8 @@ class Relation(NamedTuple):
 class Chosen(NamedTuple):
     """Values of an answer that are compared; None if unknown.
 
-    ``listed`` are all tr of the answer.  ``as_good`` are the listed and requested tr whose residual is that of the
-    chosen one within the ``+-`` of both.
+    ``listed`` are all tr of the answer; ``acceptable`` are those that it would recommend.  ``as_good`` are the tr,
+    listed or requested, whose residual is that of the chosen one within the ``+-`` of both.
     """
 
     tr: float | None
@@ -103,10 +103,12 @@ class Chosen(NamedTuple):
     basis: str
     as_good: tuple[float, ...] = ()
     listed: tuple[float, ...] = ()
+    acceptable: tuple[float, ...] = ()
 
-    def lists(self, tr: float, room: float) -> bool:
-        """Return True if the answer has a tr within ``room`` of this one [time]."""
-        return any(abs(tr - other) <= room for other in self.listed)
+
+def is_among(tr: float, others: Sequence[float], room: float) -> bool:
+    """Return True if one of the ``others`` lies within ``room`` of tr [time]."""
+    return any(abs(tr - other) <= room for other in others)
 
 
 def make_run(random: Random, fewest_states: float = 0.0) -> MadeRun:
@@ -498,6 +500,7 @@ def choose(question: Asked, requested: Sequence[float] = ()) -> Chosen:
         answer.basis,
         as_good,
         tuple(candidate.tr for candidate in answer.candidates),
+        tuple(candidate.tr for candidate in answer.candidates if candidate.acceptable),
     )
 
 
@@ -523,12 +526,11 @@ def find_difference(
             else relation.scale * first.half_width + second.half_width
         )
         room = stated + _ROUNDED * span
-        if _has_lost_first_state(relation, run, first) and not second.lists(
-            moved, room
-        ):
-            return "" if first.lists(second.tr, room) else f"tr {second.tr:.9g} is new"
-        is_as_good = any(abs(second.tr - tr) <= room for tr in first.as_good)
-        is_alike = relation.shows_other and is_as_good
+        is_kept = is_among(moved, second.acceptable, room)
+        if _has_lost_first_state(relation, run, first) and not is_kept:
+            is_known = is_among(second.tr, first.listed, room)
+            return "" if is_known else f"tr {second.tr:.9g} is new"
+        is_alike = relation.shows_other and is_among(second.tr, first.as_good, room)
         if abs(second.tr - moved) > room and not is_alike:
             return f"tr {moved:.9g} became {second.tr:.9g}, stated to {stated:.2g}"
     if first.residual is not None and second.residual is not None:
