@@ -54,7 +54,8 @@ STARTS = (
     ),
     (("info", "sample_data/rollover_box.h5"), 1.6),  # h5py alone takes 1.33
     (("plan", "sample_data/energy.csv"), 2.0),
-    (("explore", "sample_data/energy.csv", "--td", "0.064"), 2.5),
+    # The pair for this td is poor, for which explore exits with 1.
+    (("explore", "sample_data/energy.csv", "--td", "0.064", "--exit-zero"), 2.5),
 )
 
 
