@@ -2,6 +2,7 @@
 
 import gc
 import os
+import signal
 import sys
 import time
 from collections.abc import Iterator
@@ -11,6 +12,9 @@ from pathlib import Path
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # Tests start the program many times and must not compile it each time.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+# A job in the background ignores interrupts, and so would every program that a test starts and interrupts.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 # Importing the hypothesis plugins of other libraries takes 0.1 s in each process.
 os.environ.setdefault("HYPOTHESIS_NO_PLUGINS", "1")
 
