@@ -176,7 +176,7 @@ def _check_sum(
     *,
     may_fall: bool,
 ) -> None:
-    """Raise HistoryError if ``count`` neighbouring energies make the ``total`` (n,) leave all that is beside them.
+    """Raise HistoryError if ``count`` neighbouring energies make the ``total`` (n,) leave the range beside them.
 
     ``may_fall`` is True if a contact may take this energy.
     """

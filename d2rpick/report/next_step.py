@@ -76,9 +76,8 @@ def name_deck_of_run(question: RepeatedQuestion, hint: str = _MAIN_DECK) -> Name
 def _find_deck(files: Sequence[str]) -> str | None:
     """Return the only main deck in a run folder, or the deck next to a history that has its name; None if unknown."""
     if len(files) == 1 and os.path.isdir(files[0]):  # noqa: PTH112  pathlib would slow down start-up
-        from d2rpick.deck import (
-            find_decks_of_run,
-        )  # Imported here to keep start-up fast.
+        # Imported here to keep start-up fast.
+        from d2rpick.deck import find_decks_of_run
 
         decks = find_decks_of_run(files[0])
         return decks[0] if len(decks) == 1 else None
